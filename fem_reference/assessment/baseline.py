@@ -1,4 +1,4 @@
-"""The baseline of a candidate: a JSON file with its measures and positions at one time, and how far later ones may differ."""
+"""The baseline of a candidate: a JSON file with its measures and positions at one time, and the allowed changes of later ones."""
 
 import json
 import logging
@@ -26,16 +26,16 @@ FORMAT = 1
 # Decimal places that a statistic is stored with, by its unit, and a coordinate [mm].
 PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1}
 POSITION_PLACES = 2
-# How far [mm] a rounded position may be from the one that it was.
+# The greatest distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
-# How many vertices are sampled, in about 1.3 kB a frame. What moves between them shows in the statistics alone.
+# The number of sampled vertices, in about 1.3 kB a frame. Motion between them shows in the statistics only.
 SAMPLED = 64
-# The tolerances of a new baseline. Positions [mm]: far below what can be seen; a solver whose results differ by more from one
-# machine to another needs more.
+# The tolerances of a new baseline. Positions [mm]: far below visible differences; a solver whose results differ by more between
+# machines needs more.
 MOVED = 0.1
 # Of a statistic, at most this share of its greatest value over the frames.
 SHARE = 0.02
-# What is allowed is a little more than was measured, for rounding.
+# The allowed value is a little above the measured one, for rounding.
 _ROUNDING = 1 + 1e-6
 README = (
     "tolerance: how far a value may be from the one stored here; within: how far from the reference it may be at most, in the "
@@ -62,7 +62,7 @@ class StoredStatistic(Record):
 
 class Positions(Record):
     """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
-    ``tolerance`` [mm] of their distance from there.
+    ``tolerance`` [mm] of the distance to them.
     """
 
     tolerance: float = Field(ge=0)
@@ -70,14 +70,14 @@ class Positions(Record):
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
 
     def points(self, count: int, place: str) -> Floats:
-        """The values, NaN where there is none; InputError at ``place`` where a vertex is none of ``count``."""
+        """The values, NaN where there is none; InputError at ``place`` where a vertex number is not below ``count``."""
         if max(self.vertices) >= count:
             raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
         return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
 
 
 class Baseline(Record):
-    """The contents of the file: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
+    """The contents of the file: its subject (``case``, ``scene`` key, ``candidate``), its provenance (``reference`` run and
     version of ``fem_reference``), the ``frames`` (f,), and the measures by ``metric.statistic``.
     """
 
@@ -94,7 +94,7 @@ class Baseline(Record):
 
 
 def check(path: Path, case: MuscleCase, candidate: str) -> None:
-    """InputError where an update of ``path`` would write over what is damaged, or of another case or candidate."""
+    """Raise InputError where an update of ``path`` would overwrite a damaged file, or one of another case or candidate."""
     if path.exists():
         _check_whose(path, _read(path), case, candidate)
 
@@ -113,8 +113,8 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
 
 
 def update(path: Path, current: CurrentMeasures) -> Baseline:
-    """Write the current values into ``path``. Every tolerance, and every ``within`` that has a number, stays as the file has it, so
-    that accuracy cannot be lost in small steps; statistics removed from the file stay out of it.
+    """Write the current values into ``path``. Every tolerance, and every ``within`` with a number, stays as in the file, so that
+    accuracy cannot be lost in small steps; statistics removed from the file stay out of it.
     """
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
@@ -137,7 +137,7 @@ def _read(path: Path) -> Baseline:
 
 
 def _check_shape(place: str, baseline: Baseline) -> None:
-    """InputError unless every list is as long as those that it goes with, and every statistic is one of ours."""
+    """Raise InputError unless all lists that belong together are equally long, and every statistic exists."""
     known, frames = metrics.units(), len(baseline.frames)
     for name, stored in baseline.measures.items():
         if known.get(name) != stored.unit:
@@ -154,7 +154,7 @@ def _check_shape(place: str, baseline: Baseline) -> None:
 
 
 def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: str) -> None:
-    """InputError where a baseline is of another case or candidate."""
+    """Raise InputError where a baseline belongs to another case or candidate."""
     for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
@@ -187,7 +187,7 @@ def _made(current: CurrentMeasures, before: Baseline | None) -> Baseline:
 
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
-    """A statistic with the limits that it had ``before``, else those that its error bars make."""
+    """A statistic with its limits from ``before``, else with those that its error bars give."""
     limits = Limits.of(one, bars)
     if before is not None:
         limits = Limits(before.tolerance, limits.within if before.within is None else before.within)
@@ -198,18 +198,18 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
 
 
 class Limits(NamedTuple):
-    """The ``tolerance`` of a statistic about what it was, and the distance from the reference, ``within``, None if not known."""
+    """The ``tolerance`` of a change of a statistic, and its distance ``within`` from the reference, None if not known."""
 
     tolerance: float
     within: float | None
 
     @classmethod
     def of(cls, one: Measure, bars: Floats) -> "Limits":
-        """Those of a new baseline, from the error bars (f,) of a deviation.
+        """The limits of a new baseline, from the error bars (f,) of a deviation.
 
-        ``tolerance``: the greatest bar, for less is no change of accuracy, but at most ``SHARE`` of the greatest value: where the
-        reference is hardly known, the past still is. ``within``: the greatest of a value and its bar; of a run itself,
-        which has no bar, the greatest value and its tolerance.
+        ``tolerance``: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest
+        value: the past is known even where the reference hardly is. ``within``: the greatest sum of a value and its bar; for a
+        measure of the run itself, which has no bar, the greatest value plus its tolerance.
         """
         least = 10.0 * 10.0 ** -PLACES[one.unit]
         values, bar, itself = np.abs(one.values), _greatest(bars), metrics.of_itself(one.metric)
@@ -247,7 +247,7 @@ def _rounded(point: Floats) -> tuple[float, float, float] | None:
 
 
 def text(value: Any, indent: str = "") -> str:
-    """JSON with sorted keys, a line for each key and for each entry of a list of lists, so that a change is a few lines."""
+    """JSON with sorted keys, one line for each key and each entry of a list of lists, so that a change is a few lines."""
     inside = f"{indent} "
     if isinstance(value, dict):
         rows: Iterable[str] = (f"{json.dumps(key)}: {text(value[key], inside)}" for key in sorted(value))

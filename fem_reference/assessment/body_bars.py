@@ -1,4 +1,4 @@
-"""Error bars of a body: by how much its states differ from those of a sharper solution, and how much more is left."""
+"""Error bars of a body: the differences of its states from a more accurate solution, and an estimate of the rest."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,17 +9,17 @@ from fem_reference.assessment.error_bars import SAFETY
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.runs.store import Frame
 
-# The error over what half the size of cells changes of it, where it is of first order: the least order there is away from rims of
-# what is prescribed, where displacement goes with the root of the distance, whatever the element (docs/error_bars.md).
+# The error over its change when the cell size is halved, for order 1: the least order away from rims of constraints, where the
+# displacement goes with the square root of the distance, for any element (docs/error_bars.md).
 LEFT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class BodyBars:
-    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape: ``points`` (f, n)
-    [mm], ``energy`` (f,) [N mm], and by name of what is prescribed, or obstructs, the vectors ``forces`` (f,) [N] and ``moments``
-    (f,) [N mm]; NaN where nobody knows. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over
-    the nodes; ``sharper``: what the sharper solution had.
+    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
+    [mm], ``energy`` (f,) [N mm], and by name of each constraint or obstacle the vectors ``forces`` (f,) [N] and ``moments`` (f,)
+    [N mm]; NaN where unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
+    nodes; ``sharper`` describes the more accurate solution.
     """
 
     frames: tuple[float, ...]
@@ -39,11 +39,11 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
     states
         The rest state first.
     finer
-        The states of the ``sharper`` solution, perhaps fewer.
+            The states of the more accurate solution, perhaps fewer.
     shared
-        Which of its points those of the body (n,) are, -1 of one that it has not.
+            The number (n,) of each point of the body in it, -1 for a point that it lacks.
     sharper
-        What it had otherwise, in words.
+            Its differences in numerics, in words.
 
     """
     there = {state.number: state for state in finer}

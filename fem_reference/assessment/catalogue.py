@@ -1,4 +1,4 @@
-"""Entries of the verification catalogue, problems whose answers are known, and their results."""
+"""Entries of the verification catalogue, problems with known answers, and their results."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -21,13 +21,13 @@ class Lab(Protocol):
         """
 
     def second(self, body: Body, element: str, **settings: float) -> Run:
-        """The same by the second opinion, scikit-fem."""
+        """The states of the same problem by the second solver, scikit-fem."""
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A measurement: the ``value``; on a ladder of meshes the ``order`` at which its error falls, with the ``ladder`` of
-    (mesh size [mm], value) from coarse to fine; ``note``: what else a reader should know.
+    """A measurement: the ``value``; on a ladder of meshes also the ``order`` at which its error falls, and the ``ladder`` of
+    (mesh size [mm], value) from coarse to fine; ``note``: further facts for readers.
     """
 
     value: float
@@ -40,9 +40,9 @@ class Finding:
 class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
-    ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The error falls at ``order`` by theory, to within a
-    half; None: no order is measured. Where ``extrapolated``, the value is that of the last two counts without their error of
-    first order. ``note``: what else a reader should know.
+    ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met to
+    within a half; None: no order is measured. Where ``extrapolated``, the value is that of the last two counts without their
+    error of first order. ``note``: further facts for readers.
     """
 
     counts: tuple[int, ...]
@@ -57,20 +57,20 @@ class Refinement:
         return self.counts[-2 if self.extrapolated else -1 :]
 
     def value(self, found: Sequence[float]) -> float:
-        """The value that is judged, of those ``found`` from coarse to fine."""
+        """The judged value, from those ``found`` from coarse to fine."""
         return 2 * found[-1] - found[-2] if self.extrapolated else found[-1]
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A problem whose answer is known.
+    """A problem with a known answer.
 
-    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with each count of a
-    ``refinement`` where there is one, and with what is ``given`` by name. The number must come within ``within`` (in ``unit``, or
-    of the truth's size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
-    ``kind`` what it is. ``negative_control`` names one thing wrong, by which ``wrong`` replaces a part of ``given``: it must fail.
-    ``slow`` where a measurement takes above some 4 s, or is like another one, ``slow_negative_control`` where that does: tests
-    leave it to the verb verify.
+    ``measure`` finds the number that ``truth`` states, both in ``unit``. Its arguments are a lab, each count of a ``refinement``
+    where there is one, and the values ``given`` by name. The number must come within ``within`` (in ``unit``, or of the truth's
+    size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is that of the truth, ``kind`` its type.
+    ``negative_control`` names one mistake, with which ``wrong`` replaces a part of ``given``: it must fail. ``slow``: a
+    measurement takes more than some 4 s, or resembles another one; ``slow_negative_control``: the control does. Tests leave these
+    to the verb verify.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; with the negative control on the finest of a refinement alone."""
+        """The finding; with the negative control on the finest count of a refinement only."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
         if self.refinement is None:
             return _finding(self.measure(lab, **given))
@@ -115,9 +115,9 @@ def _finding(found: float | Finding) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry: ``word`` is pass or fail, or inconclusive where there is no truth; ``error`` the absolute error and
-    ``within`` its bound, both in the unit of the entry; NaN where nothing was measured or there is no truth, and then the
-    finding's note says why.
+    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth; ``error`` is the absolute error and
+    ``within`` its bound, both in the unit of the entry. They are NaN without a measurement or a truth; then the finding's note
+    gives the reason.
     """
 
     entry: Entry
@@ -160,8 +160,8 @@ def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of the packages
-    that they were made with.
+    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of the
+    packages behind them.
     """
 
     results: tuple[Result, ...]

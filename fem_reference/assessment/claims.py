@@ -1,4 +1,4 @@
-"""Error bars of references beside their differences from finer solutions, which the bars do not know."""
+"""Error bars of references, compared with the differences from finer solutions, which the bars do not use."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.metrics import Measure, described, find
 
-# The finer solution has a mesh of its own, of tetrahedra so much smaller.
+# The finer solution has a separate mesh, with tetrahedra of this share of the size.
 FINER = 0.8
-# Statistics whose bars are set beside errors: metric and name.
+# Statistics whose bars are compared with errors: metric and name.
 CLAIMED = tuple(described("claim"))
 # Differences below are rounding, in mm or %.
 LEAST = 1e-6
@@ -18,7 +18,7 @@ LEAST = 1e-6
 
 @dataclass(frozen=True)
 class Claim:
-    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and by how much the finer solution has it otherwise, ``error``."""
+    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and its difference ``error`` from the finer solution."""
 
     case: str
     of: Of
@@ -49,7 +49,9 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims, the ``sizes`` [mm] of tetrahedra by case (the reference's, the finer ones), and by case why it was left out."""
+    """All claims, by case the ``sizes`` [mm] of tetrahedra (the reference's, the finer ones), and by case the reason of
+    omission.
+    """
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]
@@ -59,16 +61,16 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of error bars, each beside the difference that a finer solution shows.
+    """The claims of error bars, each with the difference from a finer solution.
 
     Parameters
     ----------
     case
         Its name.
     of
-        ``"change"`` or ``"deviation"``: what is measured.
+            ``"change"`` or ``"deviation"``: the measured quantity.
     bars
-        Of the reference.
+            Those of the reference.
     reference, finer
         The measures of the two solutions.
 
@@ -77,7 +79,7 @@ def claimed(
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)
         one, other = (find(measures, metric, statistic) for measures in (reference, finer))
-        assert bar is not None  # every statistic of every metric has its bar
+        assert bar is not None  # every statistic of every metric has a bar
         assert one is not None
         assert other is not None
         errors = np.abs(one.values - other.values)

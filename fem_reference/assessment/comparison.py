@@ -1,4 +1,4 @@
-"""A reference and its candidates, measured and judged: what reports are written from."""
+"""A reference and its candidates, measured and judged, as input of reports."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -29,10 +29,11 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The same case on meshes each twice as fine: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
+    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest
+    two.
 
-    ``against`` says what an error is: the L2 distance to the exact solution, or the rms distance at the vertices to
-    the finest solution of order 2. ``order`` is NaN where the errors are rounding.
+    ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices to the finest
+    solution of order 2. ``order`` is NaN where the errors are rounding.
     """
 
     element: str
@@ -45,10 +46,10 @@ class Convergence:
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
-    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; of a field, which has
-    none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the extension
-    makes on the reference's own surface, None where there is none. ``error_bars``: those of the reference, None without any;
-    ``ladders``: how it converges, where that was measured.
+    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has
+    none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the extension on
+    the reference's own surface, None where there is none. ``error_bars``: those of the reference, None without;
+    ``ladders``: its convergence, where measured.
     """
 
     scene: Case
@@ -69,7 +70,7 @@ class Comparison:
         return (self.reference, *self.candidates)
 
     def __getitem__(self, key: tuple[str, str, str]) -> Measure:
-        """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; of
+        """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; for
         ``"reference"`` its change from rest. KeyError where there is none.
         """
         name, metric, statistic = key
@@ -93,7 +94,7 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """The order of the candidates, as far as the error bars separate them; nothing without these."""
+        """The order of the candidates, as far as the error bars separate them; empty without bars."""
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
@@ -103,13 +104,15 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict of the case: none that rests on a reference which was denied."""
+        """The verdict of the case; none rests on a denied reference."""
         if self.reference.outcome.status == "denied":
             return "fail"
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
 
     def word_of(self, name: str) -> Word:
-        """The verdict on a run by its name; the reference fails where it did not converge, whatever of it was met."""
+        """The verdict on a run by its name; the reference fails where it did not converge, in spite of expectations that it
+        meets.
+        """
         found = overall(one.word for one in self.verdicts if one.expectation.of == name)
         if name != "reference":
             return found
@@ -124,13 +127,13 @@ def compare(
     Parameters
     ----------
     case, setup
-        The case, and what its problem is made from.
+            The case, and the set-up of its problem.
     reference
-        The run that counts as the truth.
+            The run that serves as the truth.
     candidates
-        Runs with all frames of the case, NaN where one did not reach a frame. Of a run only what it carries is judged.
+            Runs with all frames of the case, NaN where one was not reached. Only the parts that a run carries are judged.
     error_bars
-        Those of the reference: nothing is judged that they are too wide for. None without any.
+            Those of the reference: where they are too wide, nothing is judged. None without any.
 
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
@@ -148,7 +151,7 @@ def compare(
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
-    if reference.outcome.status == "denied":  # no truth
+    if reference.outcome.status == "denied":  # it is no truth
         verdicts = tuple(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
@@ -157,7 +160,7 @@ def compare(
 
 
 class Alone(NamedTuple):
-    """A run that nothing was compared with: its ``measures``, the ``verdicts`` on them and their ``word``."""
+    """A run without a reference: its ``measures``, the ``verdicts`` on them and their ``word``."""
 
     measures: tuple[Measure, ...]
     verdicts: tuple[Verdict, ...]
@@ -165,7 +168,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
+    """The measures and verdicts of a ``run`` without a reference. A muscle has none, as all its measures take their context from
     one.
     """
     if "reference" in case.standards("reference"):
@@ -177,7 +180,7 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
 
 
 def _check_expected(case: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
-    """InputError where a case expects of a run by its name what is not measured of it, as it has no surface."""
+    """Raise InputError where a case expects a measure of a named run that the run lacks, as it has no surface."""
     for i, one in enumerate(map(resolved, case.expect)):
         if one.of in measured and not _is_measured(one, measured[one.of]):
             got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
@@ -185,12 +188,12 @@ def _check_expected(case: Case, measured: dict[str, tuple[Measure, ...]]) -> Non
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """True where what is expected is among ``measures``: of a run without a surface much is not."""
+    """True where the expected measure is among ``measures``; a run without a surface lacks many."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 
 def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | None) -> tuple[Measure, ...]:
-    """The ``measures``, each with its error bars, as far as there are some."""
+    """The ``measures``, each with its error bars where they exist."""
     if error_bars is None:
         return measures
     known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]

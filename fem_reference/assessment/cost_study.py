@@ -1,4 +1,4 @@
-"""Studies of what accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
+"""Studies of the cost of accuracy on cases: points of error and cost, as pages show and files store them."""
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.io import texts
 
 FORMAT = 1
-# What recommendations compare cases by; what they divide by is above zero.
+# The features by which recommendations compare cases; those that they divide by are above zero.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
 _WANT = "a study as the verb study writes it"
@@ -21,10 +21,9 @@ _WANT = "a study as the verb study writes it"
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case; ``units`` of errors by ``metric.statistic``, and ``bars``, the error bars of the truth, by the same;
-    ``truth``: in words what that is; ``claims``: error bars of coarser members beside their errors; ``triangles``,
-    ``travel`` [mm], the greatest displacement of the truth; ``features``, what the case is like as far as its scene says
-    (:mod:`studies.features`).
+    """The points of a case. ``units`` of errors by ``metric.statistic``, and ``bars``, the error bars of the truth, by the same;
+    ``truth``: its description; ``claims``: error bars of coarser members with their errors; ``triangles``; ``travel`` [mm], the
+    greatest displacement of the truth; ``features`` of the case, as far as its scene states them (:mod:`studies.features`).
     """
 
     case: str
@@ -40,8 +39,8 @@ class CaseStudy:
 
     @property
     def counted(self) -> tuple[Point, ...]:
-        """The points with errors as they count: an error below the truth's bar is that bar, as nothing is known below it, and so
-        is that of the truth itself.
+        """The points with their errors bounded below by the truth's bar, as nothing is known below it; also for the truth
+        itself.
         """
         names = {name for point in self.points for name in point.errors}
         own = {name: bar for name, bar in self.bars.items() if name in names}
@@ -51,8 +50,8 @@ class CaseStudy:
 
     @property
     def certain(self) -> tuple[Point, ...]:
-        """The points with errors that are at most so great whatever the truth is within its bar, which is added to each; of the
-        truth itself its bar.
+        """The points with upper bounds of their errors, for any truth within its bar, which is added to each; for the truth
+        itself its bar.
         """
         found = zip(self.points, self.counted, strict=True)
         return tuple(
@@ -69,7 +68,7 @@ class CaseStudy:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured."""
+    """Studies of cases; ``missing``: by case, the reason of omission; ``origin``: provenance of the measurements."""
 
     cases: tuple[CaseStudy, ...]
     missing: dict[str, str] = field(default_factory=dict)
@@ -87,12 +86,12 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
 
 
 def load(path: Path) -> CaseStudy:
-    """The study of a case from the file that :func:`facts` went into; InputError with the key where it is none."""
+    """The study of a case from a file written by :func:`facts`; InputError with the key where it is invalid."""
     return _read(texts.read_json(path, _WANT), f"{path}")
 
 
 def load_all(path: Path) -> list[CaseStudy]:
-    """The study of a case, or those of several, from a file; InputError as of :func:`load`."""
+    """The study of a case, or those of several, from a file; InputError as in :func:`load`."""
     found = texts.read_json(path, _WANT)
     if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
@@ -118,7 +117,7 @@ def _read(table: Any, place: str) -> CaseStudy:
 
 
 def _check(study: CaseStudy, place: str) -> None:
-    """InputError below ``place`` where a study lacks a feature, has a unit that is none of ours, or points that are of no use."""
+    """Raise InputError below ``place`` where a study lacks a feature, has an unknown unit, or unusable points."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: the verb study makes it anew")
@@ -138,7 +137,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """InputError where the keys of a scene that a point changes are no table, or its tetrahedra have no size."""
+    """Raise InputError where a point's changed scene keys are no table, or its tetrahedra have no size."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

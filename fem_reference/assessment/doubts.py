@@ -1,4 +1,4 @@
-"""Reasons to doubt a reference that its own run shows, in words."""
+"""Reasons to doubt a reference, from its own run, in words."""
 
 import numpy as np
 
@@ -9,8 +9,8 @@ _LOW = 0.1  # det F, below which a state is hardly valid
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference: that it did not reach all frames, is unstable, nearly turned inside out, left the range of
-    its laws, or lost energy.
+    """Reasons to doubt a reference: it did not reach all frames, is unstable, nearly turned inside out, left the range of its
+    laws, or lost energy.
     """
     said = list[str]() if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")

@@ -1,8 +1,8 @@
-"""Error bars: solved again with coarser numerics, the reference gives every statistic a bar, frame by frame.
+"""Error bars of every statistic, frame by frame, from further solutions of the reference with coarser numerics.
 
-In the measures that runs are measured with, and of two things: of a candidate's deviation from the reference, by how much the
-reference's runs deviate from each other: by the triangle inequality, replacing the reference by another changes a deviation by at
-most that; and of the reference's own change from rest, by which share of these deviations the changes of its runs differ.
+Bars use the measures of runs, and there are two sorts. For a candidate's deviation from the reference: the deviation of the
+reference's runs from each other, as by the triangle inequality another reference changes a deviation by at most that. For the
+reference's own change from rest: the share of these deviations by which the changes of its runs differ.
 """
 
 import json
@@ -27,30 +27,31 @@ FILE = "error_bar.json"
 FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# Longer by this for one fibre alone, of the few that there are: nothing averages there, and a pair of sizes says less than three do
-# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
+# A greater factor for a single fibre, of the few that there are: nothing averages there, and a pair of sizes is weaker
+# evidence than three (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions
+# (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# What is left of an error of first order, when halving its cause changes the result by 1.
+# The rest of an error of first order, relative to the change of the result when its cause is halved.
 VARIATION = 2.0
-# Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
-# displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
-# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/error_bars.md).
+# The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where
+# displacement goes with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
+# other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
-# By what a bar is of, by how much (f,) each statistic differs between two runs.
+# By sort of bar, the differences (f,) of each statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The distance of one statistic from the truth that the reference's own error makes: ``values`` (f,) in ``unit`` by frame, NaN
-    where nobody knows; ``of`` the reference's own change from rest, or of a candidate's deviation from the reference.
-    ``parts``: by cause, the greatest over the frames that it adds.
+    """The distance of one statistic from the truth by the reference's own error: ``values`` (f,) in ``unit`` by frame, NaN where
+    unknown; ``of`` the reference's own change from rest, or of a candidate's deviation from the reference. ``parts``: by cause,
+    its greatest contribution over the frames.
 
-    ``model`` (f,), where attachments are springs: by how much exact ones change the statistic. That is another model and no error
-    of this one, so that it is no part of ``values``.
+    ``model`` (f,), where attachments are springs: the change of the statistic by exact ones. That is another model and no error
+    of this one, so it is no part of ``values``.
     """
 
     of: Of
@@ -63,14 +64,14 @@ class ErrorBar:
 
     @property
     def widest(self) -> int:
-        """Index of the frame with the greatest bar; one that is not known counts as greatest of all."""
+        """Index of the frame with the greatest bar; an unknown bar counts as the greatest."""
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of ``sizes`` [mm], the reference's own first; the
-    error is taken to be of the ``order`` in them, in general.
+    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of ``sizes`` [mm], the reference's own first;
+    the general ``order`` of the error in them is assumed.
     """
 
     numbers: tuple[int, ...]
@@ -93,10 +94,11 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Runs of the reference over the same frames: ``fine``, itself, and ``coarse`` on larger tetrahedra; by name the ``varied``
-    ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are springs.
+    """Runs of the reference over the same frames: ``fine``, the reference itself; ``coarse``, on larger tetrahedra; by name the
+    ``varied`` ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are
+    springs.
 
-    ``sizes`` [mm] are those of the tetrahedra; ``safety`` is the factor that bars are longer by than the error expected.
+    ``sizes`` [mm] are those of the tetrahedra; ``safety`` is the factor of bars over the expected error.
     """
 
     fine: Run
@@ -107,7 +109,7 @@ class Pair:
     safety: float = SAFETY
 
     def share(self, metric: str, statistic: str) -> float:
-        """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
+        """The error of the fine run over the difference of the two, with the safety factor of a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -115,8 +117,8 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of every statistic of every metric, of changes and of deviations: what the tetrahedra and the variations add. What
-    is said of a run itself has none: it is known.
+    """The bars of every statistic of every metric, of changes and of deviations: the contributions of the tetrahedra and of the
+    variations. A statistic of a run itself has none: it is known.
     """
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(_surface)
@@ -126,7 +128,7 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """The reference's own change sees its fibres inside, candidates are surfaces."""
+        """Differences of two runs: for changes of the reference with its interior fibres, for deviations as surfaces."""
         changes = _of_changes(run, other, measured)
         return {"change": changes, "deviation": _of_deviations(surface(run), surface(other), measured)}
 
@@ -145,13 +147,13 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
                 parts[CARRIED] = SAFETY * outside[one.statistic]
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
-            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
+            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
     return ErrorBars(pair.fine.numbers, pair.sizes, ORDER, tuple(bars))
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
-    """The sizes of the signed ``differences`` of these ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
+    """The sizes of the signed ``differences`` of ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]
@@ -159,12 +161,12 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
 
 
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
-    """Those of the ``values`` by statistic that are of the surface's distance, rms (f,) [mm]."""
+    """The surface distance, rms (f,) [mm], among the ``values`` by statistic."""
     return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
 
 
 def _surface(run: Run) -> Run:
-    """The run as candidates are: a surface without an interior, so that lengths go through the measurement context's extension."""
+    """The run as a candidate: a surface without an interior, so that lengths use the measurement context's extension."""
     return replace(run, fibres=None, fibre_positions=None)
 
 
@@ -174,23 +176,23 @@ def _of_changes(run: Run, other: Run, measured: _Measured) -> list[Floats]:
 
 
 def _of_deviations(run: Run, other: Run, measured: _Measured) -> list[Floats]:
-    """The deviation of ``other`` from ``run`` less that from itself, by statistic (f,): what becomes of a deviation when the
-    reference is another.
+    """The deviation of ``other`` from ``run`` minus that from itself, by statistic (f,): the change of a deviation with another
+    reference.
     """
     return [one.values - same.values for one, same in zip(measured(other, run), measured(other, other), strict=True)]
 
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
-    """Store error bars beside the run that they are of.
+    """Store error bars with the run to which they belong.
 
     Parameters
     ----------
     bars
-        What is stored.
+            The bars to store.
     folder
-        Of the run.
+            Folder of the run.
     of
-        What they are good for, by name: they are not read again where any of it is another.
+            Their validity, by name: they are not read again where any of it differs.
 
     """
     rows = [
@@ -212,7 +214,7 @@ def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
-    """The bars stored in ``folder``; None where there are none for what ``of`` names, InputError where the file is damaged."""
+    """The bars stored in ``folder``; None where there are none that match ``of``, InputError where the file is damaged."""
     place = folder / FILE
     if not place.exists():
         return None

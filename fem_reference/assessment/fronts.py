@@ -1,6 +1,6 @@
-"""Fronts of accuracy against cost: measured settings as points, those that no other beats, and what halving an error costs.
+"""Fronts of accuracy against cost: measured settings as points, those that no other beats, and the price of half the error.
 
-Settings are compared at the same error or the same cost and never at the same settings (work-precision diagrams: Hairer, Norsett,
+Settings are compared at the same error or the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
 Wanner 1993, Solving Ordinary Differential Equations I, II.10).
 """
 
@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-# What a point may cost: by name a title and its unit. The first is what is meant by cost where nothing else is said.
+# The costs of a point: by name a title and its unit. The first is the default.
 COSTS: dict[str, tuple[str, str]] = {
     "seconds_per_frame": ("time of a frame", "s"),
     "seconds": ("whole time, with set-up", "s"),
@@ -25,21 +25,21 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The keys of a scene that say its tetrahedra.
+# The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
-# What an error, a bar or a cost can be.
+# The type of an error, a bar or a cost.
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-# A slope needs so many points, whose errors span so much.
+# A slope needs at least this many points, whose errors span at least this factor.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
 
 @dataclass(frozen=True)
 class Point:
-    """A ``solver`` with settings, run on a ``case``: what was varied (``knob``, "" for the settings that the case or the standard
-    has) to what (``value``, as text); ``choice``, all that is needed to do it again; how it ended.
+    """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default)
+    and its ``value`` as text; ``choice``, all that is needed to repeat it; its outcome.
 
-    ``errors``: by ``metric.statistic``, the greatest magnitude over the frames of the deviation from the truth; ``costs``: by name,
-    those of ``COSTS`` that it has, and seconds by phase.
+    ``errors``: by ``metric.statistic``, the greatest magnitude over the frames of the deviation from the truth; ``costs``: by
+    name, those of ``COSTS`` that it has, and seconds by phase.
     """
 
     case: str
@@ -60,7 +60,7 @@ class Point:
 
     @property
     def is_truth(self) -> bool:
-        """True of the case's own reference, which the others are measured against."""
+        """True for the case's own reference, against which all others are measured."""
         return self.name == "reference" and self.is_default
 
     @property
@@ -88,8 +88,8 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the cost of half the error along its front over that of the whole, NaN
-    where more cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which
+    """The price of accuracy of a ``solver``: ``factor``, the cost at half the error on its front over the cost at the whole, NaN
+    where more cost does not improve it; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which
     ``nearest`` has the best.
     """
 
@@ -107,7 +107,7 @@ class Price:
 
 
 def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it."""
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where it is unknown."""
     front = pareto((point for point in points if point.solver == solver), error, cost)
     pairs = [pair for point in front if (pair := point.at(error, cost))]
     if not pairs:
@@ -121,15 +121,13 @@ def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price 
 
 
 def solvers(points: Iterable[Point]) -> tuple[str, ...]:
-    """The solvers that points are of, in their order."""
+    """The solvers of the points, in order."""
     return tuple(dict.fromkeys(point.solver for point in points))
 
 
 @dataclass(frozen=True)
 class Match:
-    """The points, one of each solver at most, that are best at the ``same`` cost or error, ``at`` most so much; the best of all
-    first.
-    """
+    """The best points, at most one of each solver, at the ``same`` cost or error of at most ``at``; the best of all first."""
 
     same: str
     at: float
@@ -149,7 +147,7 @@ def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> 
 
 
 def _least(known: Sequence[tuple[tuple[float, float], Point]]) -> dict[str, Point]:
-    """The point of the least pair of numbers of each solver, the least of all first."""
+    """The point with the least pair of numbers of each solver, the least of all first."""
     best = dict[str, Point]()
     for _, point in sorted(known, key=lambda one: one[0]):
         best.setdefault(point.solver, point)

@@ -1,4 +1,4 @@
-"""Quantities that show whether a run is stable, each at every frame and where it is worst: 0 where all is well."""
+"""Quantities that show whether a run is stable, by frame and with the worst place: 0 for a healthy run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from fem_reference.problems.setup import Bone
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A run as its health is measured: ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame ``numbers``;
-    of a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, of which vertices that are ``free``
-    (n,) may be in contact; ``truth`` (f, n, 3), where the reference has the vertices; ``integrated`` (f,), V/V0 as a solver has
-    that itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the material has for certain, and
-    ``least_determinant`` (f,), the least det F, where those are known; or a scalar field's ``values`` (f, N) and the ``range`` that
-    its boundary values span.
+    """A run as its health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
+    ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, with which vertices
+    that are ``free`` (n,) may be in contact; ``truth`` (f, n, 3), the vertices of the reference, where they are the same;
+    ``integrated`` (f,), V/V0 from the solver itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the
+    material certainly has, and ``least_determinant`` (f,), the least det F, where known; or a scalar field's ``values`` (f, N)
+    and the ``range`` of its boundary values.
     """
 
     numbers: tuple[int, ...]
@@ -46,9 +46,9 @@ class Followed:
         return diagonal(self.surface.points)
 
 
-_LOOKS = 33  # how often on the way from a frame to the next it is looked where vertices are
+_LOOKS = 33  # samples of vertex positions on the path from a frame to the next
 
-# Values (f,), words (f,) and points (f, 3) of where they are worst, the last two None where that is nowhere in particular.
+# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None where there is no particular place.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 
@@ -62,8 +62,8 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """Share that is turned inside out: tetrahedra, in per cent of the volume at rest, where there are some, else the surface, in
-    per cent of its area. Of curved elements, whose corners do not say it, all or nothing, as the least det F is.
+    """Inverted share: of tetrahedra, in per cent of the volume at rest, where there are some, else of the surface, in per cent of
+    its area. For curved elements, whose corners do not show it, all or nothing, by the least det F.
     """
     if run.least_determinant is not None:
         words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
@@ -86,24 +86,24 @@ def inside_out(run: Followed) -> Found:
 
 
 def from_rest(run: Followed) -> Found:
-    """Greatest distance of a vertex from where it was at rest, in per cent of the body's size."""
+    """Greatest distance of a vertex from its rest position, in per cent of the body's size."""
     return _off(run, np.broadcast_to(run.surface.points, run.positions.shape))
 
 
 def from_first(run: Followed) -> Found:
-    """Greatest distance of a vertex from where it is if it moves with the first bone, in per cent of the body's size."""
+    """Greatest distance of a vertex from its position in a rigid motion with the first bone, in per cent of the body's size."""
     poses = [run.bones[0].pose(number) for number in run.numbers]
     return _off(run, np.array([apply(pose, run.surface.points) for pose in poses]))
 
 
 def from_reference(run: Followed) -> Found:
-    """Greatest distance of a vertex from where the reference has it, in per cent of the body's size; NaN without a reference."""
+    """Greatest distance of a vertex from that of the reference, in per cent of the body's size; NaN without a reference."""
     nowhere = np.full(run.positions.shape, np.nan)
     return _off(run, nowhere if run.truth is None else run.truth)
 
 
 def unrest(run: Followed) -> Found:
-    """Greatest displacement of a vertex since the frame before, in per cent of the body's size."""
+    """Greatest displacement of a vertex since the last frame, in per cent of the body's size."""
     return _off(run, np.concatenate([run.positions[:1], run.positions[:-1]]))
 
 
@@ -132,7 +132,7 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """Greatest depth of a free vertex inside a bone on the straight path from the frame before, as seen from the bone, in per cent
+    """Greatest depth of a free vertex inside a bone on the straight path from the last frame, relative to the bone, in per cent
     of the body's size: a bone that crossed the body is outside of it before and after.
     """
     free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
@@ -199,7 +199,7 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
 
 
 def unstable(run: Followed) -> str:
-    """The frames in which a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
+    """The frames in which a run is an unstable equilibrium, in words; empty where there are none or modes were not counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()

@@ -12,7 +12,7 @@ from fem_reference.metrics import Measure, units
 from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
-# What is expected is met: commands end with 0, as they do where nothing is judged or known well enough.
+# Verdicts with which commands end with 0: the expectation is met, not judged, or inconclusive.
 MET: tuple[Word, ...] = ("pass", "doubtful pass")
 _KINDS = {
     "mm": ("a length", 1.0),
@@ -26,8 +26,8 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on an expectation: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
-    well the reference is known there, NaN where nobody knows and None without any.
+    """The verdict on an expectation: the ``word``, and the decisive ``value`` in ``unit`` at ``frame``; ``error_bar`` of the
+    reference there, NaN where unknown and None without any.
     """
 
     word: Word
@@ -41,8 +41,9 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass where ``abs(value - truth) <= within`` wherever within its ``error_bar`` the truth is, fail where it is nowhere, else
-    inconclusive (all four in one unit). A value that is no number fails; without a truth, a tolerance or a bar nothing is known.
+    """Pass where ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail where for none, else
+    inconclusive (all four in one unit). A value that is no number fails; without a truth, a tolerance or a bar it is
+    inconclusive.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
     ('pass', 'fail', 'inconclusive')
@@ -62,19 +63,19 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """Fail if one fails, else inconclusive if one is, else a doubtful pass if one is, else pass; not judged where there is none."""
+    """The combined verdict: fail, inconclusive, doubtful pass, pass: the first of these that occurs; not judged without any."""
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
 
 
 def doubted(word: Word, doubts: Collection[str]) -> Word:
-    """A verdict that rests on a reference, of which there may be ``doubts``: a pass is a doubtful one then."""
+    """A verdict that rests on a reference with possible ``doubts``: they make a pass doubtful."""
     return "doubtful pass" if word == "pass" and doubts else word
 
 
 def check(case: Case) -> None:
-    """InputError unless every expectation of the case is of a measure and a frame that there will be, in its unit."""
+    """Raise InputError unless every expectation of the case has an existing measure and frame, in the measure's unit."""
     numbers = case.numbers
     for i, entry in enumerate(case.expect):
         place, expectation = join(case.place, f"expect[{i}]"), resolved(entry)
@@ -99,7 +100,7 @@ def check(case: Case) -> None:
 
 
 def resolved(expectation: Expectation) -> Expectation:
-    """An ``expectation`` with its statistic: where it has none, the only one that its metric has."""
+    """An ``expectation`` with its statistic: by default the only one of its metric."""
     start = f"{expectation.metric}."
     names = [name.removeprefix(start) for name in units() if name.startswith(start)]
     if expectation.statistic is not None or len(names) != 1:
@@ -108,7 +109,7 @@ def resolved(expectation: Expectation) -> Expectation:
 
 
 def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``."""
+    """The verdict on a checked ``expectation`` from the measures of its run, over frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
     bars = found.error_bars
@@ -118,8 +119,8 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
     words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
     word = overall(words)
-    # The frame that decides: the first that fails, else that with the greatest bar of those that are inconclusive, else the one
-    # furthest from the truth.
+    # The decisive frame: the first that fails, else the inconclusive one with the greatest bar, else the one farthest
+    # from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
     widest = max(
         range(len(values)), key=lambda k: (words[k] == "inconclusive", math.inf if math.isnan(known[k]) else known[k])
@@ -131,6 +132,6 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
 
 
 def in_unit(given: str | float, unit: str) -> float:
-    """A quantity in the ``unit`` of a measure, a bare number only where that has none; ValueError where it is none of that kind."""
+    """A quantity in the ``unit`` of a measure, a bare number only where that has none; ValueError where the dimension differs."""
     kind, factor = _KINDS[unit]
     return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

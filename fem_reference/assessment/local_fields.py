@@ -1,4 +1,4 @@
-"""Quantities of runs at every vertex and every fibre point, frame by frame: what a view is coloured by, and ParaView shows."""
+"""Quantities of runs at every vertex and fibre point, by frame, as colours of a view and for ParaView."""
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from fem_reference.runs.store import Run
 
 @np.errstate(over="ignore", invalid="ignore")
 def to_same_vertex(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the same vertex of the reference; NaN where one is not known."""
+    """Distance (f, n) [mm] of each vertex to the same vertex of the reference; NaN where unknown."""
     return np.asarray(np.linalg.norm(run.positions - reference.positions, axis=2))
 
 
 def to_surface(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN where not known."""
+    """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN where unknown."""
     return np.stack(
         [_to_surface(*frame, reference.surface) for frame in zip(run.positions, reference.positions, strict=True)]
     )
@@ -30,8 +30,8 @@ def _to_surface(points: Floats, others: Floats, rest: Surface) -> Floats:
 
 
 def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
-    """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN where a vertex is
-    not free of bones or not known. None where a bone is not closed: it has no inside.
+    """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN for vertices
+    that are exempt from contact or unknown. None where a bone is not closed: it has no inside.
     """
     try:
         frames = [_gaps(points, number, context) for number, points in zip(run.numbers, run.positions, strict=True)]
@@ -50,14 +50,14 @@ def _gaps(points: Floats, number: int, context: MeasurementContext) -> Floats:
 
 
 def to_bone(bone: Bone, number: int, points: Floats) -> Floats:
-    """Distance (n,) [mm] of ``points`` (n, 3) to a ``bone`` where it is at a frame ``number``, negative inside; InputError where
-    the bone is not closed.
+    """Distance (n,) [mm] of ``points`` (n, 3) to a ``bone`` at a frame ``number``, negative inside; InputError where the bone is
+    not closed.
     """
     return np.asarray(bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance)
 
 
 def fibre_points(run: Run, context: MeasurementContext) -> Floats:
-    """Positions of the points of the fibres, (f, m, 3) [mm]: by the run itself, or carried along by its surface."""
+    """Positions of the points of the fibres, (f, m, 3) [mm]: from the run itself, or carried by its surface."""
     own = run.fibre_positions
     if own is not None and own.shape[1:] == context.fibres.points.shape:
         return own
@@ -69,7 +69,7 @@ def stretch_along(lines: Polylines, positions: Floats) -> Floats:
     point over that at rest.
     """
     count = len(lines.points)
-    joined = np.ones(count - 1, bool)  # whether a piece joins a point with the next
+    joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next
     joined[lines.offsets[1:-1] - 1] = False
     pieces = np.flatnonzero(joined)
     ends = np.concatenate([pieces, pieces + 1])

@@ -1,4 +1,4 @@
-"""A candidate as it is now: measured against its reference, and where a sample of its vertices are."""
+"""A current candidate: its measures against the reference, and positions of a sample of its vertices."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class CurrentMeasures:
 
     @property
     def points(self) -> Floats:
-        """Positions of the candidate's vertices (f, n, 3) [mm]; of one without a surface, of its fibre points."""
+        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points where it has no surface."""
         inside = self.candidate.fibre_positions
         return self.candidate.positions if self.candidate.has_surface or inside is None else inside
 
@@ -49,24 +49,26 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The folder of the reference in the store, which names its scene, settings and code; its solver where it has none."""
+        """The reference's folder in the store, whose name depends on scene, settings and code; its solver where it has no
+        folder.
+        """
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 
     @property
     def by_name(self) -> dict[str, Measure]:
-        """The measures by ``metric.statistic``, without those that say another in per cent."""
+        """The measures by ``metric.statistic``, without those that repeat another in per cent."""
         found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 
     def values(self, metric: str, statistic: str) -> Floats:
-        """The values (f,) of a statistic, NaN where it is no finite number or is not measured of this candidate."""
+        """The values (f,) of a statistic, NaN where not finite or not measured for this candidate."""
         found = (one.values for one in self.measures if (one.metric, one.statistic) == (metric, statistic))
         values = next(found, np.full(len(self.reference.numbers), np.nan))
         return np.where(np.isfinite(values), values, np.nan)
 
     def bars(self, metric: str, statistic: str) -> Floats:
-        """The error bars (f,) of a deviation, NaN where nobody knows; what is said of a run itself is known."""
+        """The error bars (f,) of a deviation, NaN where unknown; a statistic of the run itself is known exactly."""
         if metrics.of_itself(metric):
             return np.zeros(len(self.reference.numbers))
         found = None if self.error_bars is None else self.error_bars.find("deviation", metric, statistic)
@@ -74,8 +76,8 @@ class CurrentMeasures:
 
 
 def sample(points: Floats, count: int) -> Ints:
-    """Indices (k,) of at most ``count`` vertices of ``points`` (n, 3), each as far as can be from those before it; the first is the
-    one furthest from the middle of all.
+    """Indices (k,) of at most ``count`` vertices of ``points`` (n, 3), each as far as possible from those before it; the first is
+    the farthest from the middle of all.
     """
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.linalg.norm(points - points[chosen[0]], axis=1)

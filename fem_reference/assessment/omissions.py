@@ -1,4 +1,4 @@
-"""Omissions of an effect of a scene, or a feature of a solver: what they change, beside the error bar, and what they save."""
+"""Omissions of an effect of a scene or a feature of a solver: their changes, compared with the error bar, and their savings."""
 
 import math
 from collections.abc import Mapping
@@ -8,11 +8,11 @@ from typing import Any, Literal
 from fem_reference.metrics import described, metric
 
 FORMAT = 1
-# What is measured of a run with something left out, against the same solver with all of it.
+# Measures of a run with an omission, against the same solver without.
 MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
 # Where all changes are below this share of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
-# Parts of the time of solving that runs may know apart, and what runs call them; the whole of it is a little more.
+# Parts of the solving time that runs may report, and their names in runs; the total is a little more.
 PHASES = {"assembly": ("assembly",), "contact": ("contact",), "linear systems": ("factorisation", "krylov")}
 COUNTS = ("unknowns", "newton_iterations", "load_steps")
 
@@ -21,12 +21,12 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 
 @dataclass(frozen=True)
 class Omission:
-    """A run with something ``left_out``, by name: nothing, one thing, or all that can be; how it ended. ``instead``: settings that
-    had to change with it. A run that was not made has the status ``"refused"``.
+    """A run with something ``left_out``, by name: nothing, one thing, or all possible things; its outcome. ``instead``: settings
+    that had to change with it. A run that was not made has the status ``"refused"``.
 
-    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the run with all of it; nothing
-    where one of them is not known. ``predicted``: by the same, what an indicator said before, where there is one. ``costs``: by
-    name, as the run has them.
+    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out
+    where unknown in a frame. ``predicted``: by the same, the value of an indicator, where there is one. ``costs``: by name, as in
+    the run.
     """
 
     left_out: tuple[str, ...]
@@ -39,19 +39,19 @@ class Omission:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s], of the reference that of solving alone: never of compilation. NaN where it is not known."""
+        """Processor time [s]; for the reference of solving only, without compilation. NaN where unknown."""
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where it is not known."""
+        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run called ``name`` by ``solver``: the ``whole``, with each thing left out and with all of them; ``kept``: what is never
-    left out, by name.
+    """A run called ``name`` by ``solver``: the ``whole``, the runs with each omission and with all; ``kept``: names of things
+    that are never omitted.
     """
 
     name: str
@@ -61,18 +61,18 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] over that of the whole, NaN where one of them is not known."""
+        """A time [s] over that of the complete run, NaN where one is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` over that of the whole, NaN where one of them is not known."""
+        """One of ``COUNTS`` over that of the complete run, NaN where one is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 
 @dataclass(frozen=True)
 class CaseOmissions:
     """The ablations of a case, the reference's first. ``bars``: its error bars by ``metric.statistic``, the greatest over the
-    frames, and ``unknown``, why there are none; ``units`` by the same; ``origin``: with what and on what it was measured.
+    frames; ``unknown``: the reason why there are none; ``units`` by the same; ``origin``: provenance of the measurements.
     """
 
     case: str
@@ -85,7 +85,7 @@ class CaseOmissions:
 
 
 def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str, float]:
-    """Each of ``changes`` in error bars: NaN where the bar is not known.
+    """Each of ``changes`` in error bars: NaN where the bar is unknown.
 
     >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
     {'volume.deviation': 2.0, 'surface_deviation.rms': nan}
@@ -94,8 +94,8 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters where one of ``changes`` is above its error bar, and does not where all are below a tenth of
-    it.
+    """Judge an omission: it matters where one of ``changes`` exceeds its error bar, and does not matter where all are below a
+    tenth of theirs.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

@@ -9,7 +9,7 @@ from fem_reference.metrics import Measure, described, find
 
 @dataclass(frozen=True)
 class Deviation:
-    """The distance of ``name`` from the reference in its worst frame, known to ``bar`` there, NaN where nobody knows."""
+    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` there, NaN where unknown."""
 
     name: str
     value: float
@@ -18,8 +18,8 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A deviation with the ranks that it may have, ``first`` to ``last``, and the names that it is not distinguishable from,
-    ``alike``.
+    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be distinguished from
+    it.
     """
 
     deviation: Deviation
@@ -35,7 +35,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The ``places`` by one statistic, the least deviation first; ``title`` is what it is called, in ``unit``."""
+    """The ``places`` by one statistic, the least deviation first; ``title``: its name, in ``unit``."""
 
     title: str
     unit: str
@@ -43,15 +43,15 @@ class Ranking:
 
     @property
     def pairs(self) -> tuple[int, int]:
-        """The number of pairs that can be distinguished, and of all."""
+        """The number of distinguishable pairs, and of all pairs."""
         count = len(self.places)
         alike = sum(len(place.alike) for place in self.places) // 2
         return count * (count - 1) // 2 - alike, count * (count - 1) // 2
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: one is less than another where their bars do not reach each other; a deviation that is not a
-    number comes after all that are one.
+    """The places of ``deviations``: one is less than another where their bars do not overlap; a deviation that is not a number
+    comes after all numbers.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']
@@ -69,15 +69,15 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
 
 
 def _less(one: Deviation, other: Deviation) -> bool:
-    """True where ``one`` is nearer to the truth than ``other`` for certain."""
+    """True where ``one`` is certainly nearer to the truth than ``other``."""
     if math.isnan(other.value):
         return not math.isnan(one.value)
     return one.value + one.bar < other.value - other.bar
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """The ranking by each statistic that solvers are ranked by, of those of ``measured`` (measures against the reference by name)
-    that have it; ``bars``: the error bars of deviations; a statistic without one is left out.
+    """The rankings of ``measured`` (measures against the reference by name) by each ranked statistic, among those that have it;
+    ``bars``: the error bars of deviations; a statistic without one is left out.
     """
     known, found = tuple(bars), []
     for key, stated in described("rank").items():

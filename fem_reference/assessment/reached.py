@@ -1,4 +1,4 @@
-"""A comparison over the frames that its reference reached."""
+"""A comparison restricted to the frames that its reference reached."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,7 @@ def frames(run: Run) -> Ints:
 
 
 def cut(comparison: Comparison) -> Comparison:
-    """The comparison without the frames that a reference which failed did not reach; itself where it reached all, or none."""
+    """The comparison without the frames that a failed reference did not reach; unchanged where it reached all, or none."""
     kept = frames(comparison.reference)
     if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
         return comparison

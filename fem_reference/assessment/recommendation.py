@@ -1,5 +1,5 @@
-"""Recommendation of a setting for an error or a time: the cheapest or nearest measured one, on the case itself or on those most
-like it.
+"""Recommendation of a setting for an error or a time: the cheapest or most accurate measured one, on the case itself or on the
+most similar cases.
 """
 
 import math
@@ -14,18 +14,18 @@ from fem_reference.assessment.settings import is_elsewhere, setting, tetrahedra
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
-# Of other cases so many are asked, those most alike.
+# The number of most similar other cases that are used.
 _ALIKE = 3
-# Of what is expected from other cases, this share is met on each case that was left out when the margin was found.
+# The share of expectations from other cases that are met on each left-out case, for the margin.
 _MET = 0.95
-# By which features cases are alike.
+# The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
 
 
 @dataclass(frozen=True)
 class Expected:
-    """A setting with the ``error`` and the ``time`` of a frame [s] that are expected of it; ``of``: the cases it was
-    measured on. Where that is the case itself, ``bar`` is the part of the error that is the bar of the truth, as far as known.
+    """A setting with its expected ``error`` and ``time`` per frame [s]; ``of``: the cases on which it was measured. Where that is
+    the case itself, ``bar`` is the known error bar of the truth, as a part of the error.
     """
 
     point: Point
@@ -36,18 +36,18 @@ class Expected:
 
     @property
     def counted(self) -> float:
-        """The error as it ranks: what is measured below the bar of the truth is not better than that."""
+        """The error for ranking: a measured error below the bar of the truth counts as the bar."""
         return max(self.error - self.bar, self.bar)
 
     def misses(self, limits: Mapping[str, float]) -> float:
-        """Ratio to what ``limits`` allow, the worse of its error and its time."""
+        """The greater ratio of its error or time to the ``limits``."""
         own = {"error": self.error, "time": self.time}
         return max(own[name] / limit for name, limit in limits.items())
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Factors by which errors and times are taken to be greater than on the cases most alike; 1 where measured on the case."""
+    """Factors on errors and times relative to the most similar cases; 1 where measured on the case."""
 
     error: float = 1.0
     time: float = 1.0
@@ -55,8 +55,8 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """The ``best`` setting (None: no setting meets what is asked) out of ``count``, with the ``margins`` that are in it;
-    ``measured``: True where on the case itself; ``nearest``: where none meets it, the one that misses it least.
+    """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True where
+    on the case itself; ``nearest``: where none meets the limits, the one that misses them least.
     """
 
     best: Expected | None
@@ -70,9 +70,9 @@ class Recommendation:
 def recommend(
     features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
-    """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the nearest whose time
-    for a frame [s] is at most ``limits["time"]``; both where both are given (the cheapest then). Only studies that have the metric
-    count. An error is at most what was measured and the bar of the truth, as in the tables of a study.
+    """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the most accurate whose time
+    per frame [s] is at most ``limits["time"]``; with both limits, the cheapest within both. Only studies with the metric count.
+    An error counts as measured plus the bar of the truth, as in the tables of a study.
     """
     studies = [study for study in studies if metric in study.units]
     own = [study for study in studies if study.case == case and _is_same(features, study.features)]
@@ -92,7 +92,7 @@ def recommend(
 def _comparable(
     features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str
 ) -> Sequence[CaseStudy]:
-    """The studies that say something of a case with these features: lengths count by the motion of bones, which there must be."""
+    """The studies that are comparable with these features: lengths scale with the motion of bones, which there must be."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -104,7 +104,7 @@ def _comparable(
 
 
 def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    """True where a case has the features that it had when it was studied."""
+    """True where a case has the same features as when it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
@@ -114,7 +114,7 @@ def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[C
 
 
 def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Distance of two cases: over ratios, in powers of two; a case with contact and one without are far apart."""
+    """Distance of two cases: over ratios, in powers of two; cases with and without contact are far apart."""
     pairs = [(_compared(one, name), _compared(other, name)) for name in _COMPARED]
     return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
 
@@ -126,7 +126,7 @@ def _compared(features: Mapping[str, float], name: str) -> float:
 
 
 def _measured(study: CaseStudy, metric: str) -> list[Expected]:
-    """The settings measured on a case, the truth itself among them; what is not known of it counts as error."""
+    """The settings measured on a case, the truth itself among them; its error bar counts as error."""
     bar, pairs = study.bars.get(metric, 0.0), zip(study.points, study.certain, strict=True)
     known = [(point, pair) for point, certain in pairs if (pair := certain.at(metric, TIME))]
     return [Expected(point, error, time, (study.case,), bar) for point, (error, time) in known]
@@ -135,7 +135,7 @@ def _measured(study: CaseStudy, metric: str) -> list[Expected]:
 def _expected(
     features: Mapping[str, float], studies: Sequence[CaseStudy], metric: str, margins: Margins
 ) -> Iterable[Expected]:
-    """The settings that were measured on every one of the cases most alike; errors count by the motion, times by the triangles, and
+    """The settings that were measured on all of the most similar cases. Errors scale with the motion, times with the triangles;
     the worst of the cases counts.
     """
     chosen = alike(features, studies)
@@ -156,7 +156,7 @@ def _expected(
 
 
 def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
-    """The factor by which an error on the ``other`` case counts here: lengths by the motion, shares as they are."""
+    """The factor from an error on the ``other`` case to one here: lengths scale with the motion, shares do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 
@@ -165,8 +165,8 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
-    """A point of a studied case as it is on another: tetrahedra in the size of that case's own; twice as large for each refinement
-    that they should have less than none.
+    """A point of a studied case, translated to another: tetrahedra relative to the size of the case's own, doubled for each
+    refinement below zero.
     """
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
@@ -179,7 +179,7 @@ def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -
 
 
 def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
-    """Found by leaving out each study in turn: how many times as great what was measured there is as expected from the others."""
+    """Margins from leaving out each study in turn: the ratio of its measured values to those expected from the others."""
     errors, times = list[float](), list[float]()
     for study in studies:
         others = [other for other in studies if other is not study]
@@ -189,5 +189,5 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
                 errors.append(here.error / one.error)
                 times.append(here.time / one.time)
     if not errors:
-        return Margins(2.0, 2.0)  # of one study alone nothing can be learned about others
+        return Margins(2.0, 2.0)  # a single study shows nothing about others
     return Margins(*(max(1.0, float(np.quantile(ratios, _MET))) for ratios in (errors, times)))

@@ -1,4 +1,4 @@
-"""Current measures against a baseline and against the reference: a verdict on every statistic, from the frame that decides it."""
+"""Current measures against a baseline and against the reference: a verdict on every statistic, from its decisive frame."""
 
 import math
 from collections.abc import Iterator
@@ -22,11 +22,10 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and of the ``frame`` that decides.
+    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and of the decisive frame.
 
-    ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` how far it may be from what it was
-    (``unchanged``) or from the reference (``within``), NaN where that is not known; ``known`` how well what it is compared with
-    is known.
+    ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` is its greatest distance from its earlier value
+    (``unchanged``) or from the reference (``within``), NaN where unknown; ``known`` is the error bar of that comparison value.
     """
 
     question: Question
@@ -41,12 +40,12 @@ class Judgement:
 
     @property
     def away(self) -> float:
-        """The distance of the current value from what it is compared with."""
+        """The distance of the current value from its comparison value."""
         return abs(self.current - self.was if self.question == "unchanged" else self.current)
 
     @property
     def used(self) -> float:
-        """The share of what is allowed that is used up; infinite where that is no number."""
+        """The used share of the allowed distance; infinite where that is no number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 
@@ -67,7 +66,7 @@ class Judgement:
 
     @property
     def _direction(self) -> str:
-        """Words for a change that is nearer to the reference or further from it."""
+        """Words for a change towards the reference or away from it."""
         if self.question == "within" or self.name == MOVED or abs(self.current) == abs(self.was):
             return ""
         where = "nearer to" if abs(self.current) < abs(self.was) else "further from"
@@ -96,7 +95,7 @@ class Check:
 
     @property
     def word(self) -> Word:
-        """The verdict of all: a pass is doubtful where the reference is."""
+        """The verdict of all: a pass is doubtful where the reference is doubted."""
         return judge.doubted(judge.overall(one.word for one in self.judgements), self.doubts)
 
     def answer(self, question: Question) -> Word:
@@ -117,7 +116,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
     found.sort(
         key=lambda one: (
             WORST_FIRST.index(one.word),
-            one.question != "within",  # what is worse comes before what is other
+            one.question != "within",  # a worse result comes before a merely different one
             one.name != MOVED,
             -one.used,
             one.name,
@@ -128,7 +127,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
 
 
 class _Frames(NamedTuple):
-    """The frames (f,) of a statistic: its value in the baseline and now, what is right now, and its error bar."""
+    """The frames (f,) of a statistic: its values in the baseline and now, its target, and its error bar."""
 
     was: Floats
     current: Floats
@@ -137,7 +136,7 @@ class _Frames(NamedTuple):
 
 
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
-    """Judge that the sampled vertices are where they were: by the greatest distance [mm] of each frame."""
+    """Judge whether the sampled vertices are unchanged, by the greatest distance [mm] of each frame."""
     was = positions.points(len(current.rest), "baseline")
     with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
@@ -147,14 +146,14 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
 
 
 def _unchanged(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Judge that a statistic is what it was: the baseline is known but for rounding."""
+    """Judge whether a statistic is unchanged; the baseline is exact but for rounding."""
     was = stored.numbers
     known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
     return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, current)
 
 
 def _within(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Judge that a statistic is as near to the reference as it should be: that is known to its error bar."""
+    """Judge whether a statistic is within its allowed distance from the reference, which is known up to its error bar."""
     was, within = stored.numbers, math.nan if stored.within is None else stored.within
     frames = _Frames(was, now, np.zeros(len(was)), current.bars(*name.split(".")))
     return _judged("within", (name, stored.unit), frames, within, current)
@@ -163,7 +162,7 @@ def _within(name: str, stored: StoredStatistic, now: Floats, current: CurrentMea
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """The judgement by the frame that decides: of those with the word that counts, the one furthest off, or known worst."""
+    """The judgement by the decisive frame: of those with the decisive word, the one farthest off, or with the greatest bar."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)
@@ -174,7 +173,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; where there was no number and is none, it is inconclusive, and where there is one now, it fails."""
+    """The verdict on one frame; inconclusive where there is no number before or now, fail where a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

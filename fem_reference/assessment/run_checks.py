@@ -1,7 +1,7 @@
-"""Checks of the states that a solver calls converged: by positions and forces that it recorded, and nothing of its loop.
+"""Checks of the states that a solver calls converged, from its recorded positions and forces, independent of its loop.
 
-Every frame is asked; each check stands beside what is allowed, at the frame and place where it comes nearest to that, or goes
-farthest beyond.
+Every frame is checked. Each check has its allowed value, and the frame and place where it comes nearest to that value, or exceeds
+it most.
 """
 
 import math
@@ -26,26 +26,26 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.store import Run
 
-# What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
+# A position is correct up to this share of the body's size; rounding of stored values is a thousandth of it.
 _ROUNDING = 1e-9
-# Attached vertices go astray from their bone by strain times how far they are from the facets that are attached: stretch up to 4.
+# Attached vertices deviate from their bone by strain times their distance from the attached facets: stretch up to 4.
 _STRAIN = 3.0
-# By how much more than the recorded force says springs may have yielded on average: they pull at other points of the surface.
+# Factor on the mean extension of springs from the recorded force: they pull at other points of the surface.
 _SPRINGS = 1.5
-# What bones turn by within a load step at most, on average between two frames: beyond it nothing says in which direction it turned.
+# The greatest rotation of a bone per load step, on average between two frames: beyond it the direction is unknown.
 _TURN = 1.01 * math.pi / 2
-# Between points of contact, half a spacing apart, a right-angled edge gets in by a quarter of it; of self-contact there is none,
-# and what a surface may reach through itself is what its creases do.
+# Between contact points, half a spacing apart, a right-angled edge penetrates by a quarter of it. There is no self-contact:
+# the surface may reach through itself as far as its creases do.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Contact gives way where bones are deeper than this share of half their thickness, whatever its stiffness.
+# Contact gives way where a bone is deeper than this share of half its thickness, for any stiffness.
 _GIVEN_WAY = 0.75
-# Forces are in balance to so many times the residual of all unknowns together.
+# The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
 _BALANCE = 10.0
 
 
 @dataclass(frozen=True)
 class RunCheck:
-    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, which may be ``allowed`` at most, both in ``unit``."""
+    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, and its greatest ``allowed`` value, both in ``unit``."""
 
     name: str
     value: float
@@ -56,12 +56,12 @@ class RunCheck:
 
     @property
     def met(self) -> bool:
-        """True where it is as it should be; never of what is not a number."""
+        """True where the value is allowed; never for a value that is not a number."""
         return self.value <= self.allowed
 
     @property
     def share(self) -> float:
-        """The value in what is allowed; infinite where either is not a number."""
+        """The value over the allowed one; infinite where either is not a number."""
         share = self.value / self.allowed
         return math.inf if math.isnan(share) else share
 
@@ -79,7 +79,7 @@ Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """All states there and finite, and what is prescribed exactly met at its nodes."""
+    """Check that all states exist and are finite, and that exactly prescribed displacements are met at their nodes."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
@@ -88,7 +88,7 @@ def of_body(body: Body, solved: Run) -> RunChecks:
 
 
 def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
-    begun = body.start is not None  # its first state is where it is put
+    begun = body.start is not None  # its first state is prescribed
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
             if entry.stiffness is None and isinstance(entry.on, str):
@@ -98,20 +98,20 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
                 allowed = SAME * (
                     body.size + float(np.abs(wanted).max())
-                )  # by which regions may contradict where they meet
+                )  # up to which regions may contradict each other where they meet
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
-    """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
-    bone and no surface crossed. ``nodes``: where the points of the tetrahedra are, where that is known.
+    """Check that all frames exist, in order and finite; attachments are at their bones; load steps are small enough; forces
+    balance; and neither a bone nor the surface is crossed. ``nodes``: the points of the tetrahedra, where known.
     """
     fibres = [] if run.fibre_positions is None else [run.fibre_positions]
     arrays = [np.concatenate([array[i] for array in (run.positions, *fibres)]) for i in range(len(run.numbers))]
     found = (_complete(problem.frames, run.numbers), _finite(run.numbers, arrays))
     if not all(one.met for one in found):
         return found
-    if problem.start is not None:  # its first state is where it is put
+    if problem.start is not None:  # its first state is prescribed
         scalars = {name: values[1:] for name, values in run.scalars.items()}
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
@@ -120,7 +120,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
 
 
 def _worst(checks: Iterable[RunCheck]) -> RunChecks:
-    """The one of the ``checks`` of each name that comes nearest to what is allowed, or is farthest beyond."""
+    """For each name, the check that comes nearest to its allowed value, or exceeds it most."""
     found = dict[str, RunCheck]()
     for one in checks:
         if one.name not in found or one.share > found[one.name].share:
@@ -129,13 +129,13 @@ def _worst(checks: Iterable[RunCheck]) -> RunChecks:
 
 
 def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
-    """The check at the point (n, 3) where ``values`` (n,) [mm] are nearest to what is ``allowed`` (n,), or beyond it most."""
+    """The check at the point (n, 3) whose ``values`` (n,) [mm] come nearest to ``allowed`` (n,), or exceed it most."""
     i = int(np.argmax(values / allowed))
     return RunCheck(name, float(values[i]), float(allowed[i]), "mm", frame, place_of(places[i]))
 
 
 def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> RunCheck:
-    """The number of frames that are missing or not in their place."""
+    """The number of missing or misplaced frames."""
     lost = sum(one != other for one, other in zip(wanted, numbers, strict=False)) + abs(len(wanted) - len(numbers))
     first = next((one for one, other in zip(wanted, numbers, strict=False) if one != other), wanted[-1])
     return RunCheck("frames that are missing or out of order", float(lost), 0.0, "", first)
@@ -149,8 +149,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """Exact: vertices at the pose of their bone, but for strain over how far they are from the facets that are attached. Springs:
-    by their mean extension, which is the force over stiffness and area.
+    """Exact attachments: vertices at the pose of their bone, up to strain times their distance from the attached facets. Springs:
+    their mean extension, which is the force over stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
@@ -170,7 +170,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
 
 
 def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """Rotation and travel of a bone in a load step, on average from a frame to the next; not of a frame that needed none."""
+    """Rotation and travel of a bone per load step, on average between two frames; skips frames that needed no step."""
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
     bones = [bone for bone in problem.bones if bone.name in attached or (contact and contact.is_by(bone.name))]
@@ -190,14 +190,14 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 def _travel(bone: Bone, before: float, after: float) -> float:
     """Travel of a bone between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
     motion = bone.motion
-    assert motion is not None  # of those that move
+    assert motion is not None  # called for moving bones only
     amounts = motion.angles if isinstance(motion, Rotation) else motion.distances
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
     return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external effects."""
     outer = any(one.outer or _is_foreign(one) for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -208,12 +208,12 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _is_foreign(effect: Effect) -> bool:
-    """True of an effect of the caller's own, of which it is not known what it acts from."""
+    """True for a user's own effect, whose origin of force is unknown."""
     return not type(effect).__module__.startswith("fem_reference.effects.")
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
-    """Index and number of the frames at which muscle or ``bones`` are elsewhere than at rest, and at all frames before."""
+    """Index and number of the frames at which muscle or ``bones`` are not at rest, and of all earlier frames."""
     seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         now = (run.positions[i], *(bone.pose(number) for bone in bones))
@@ -223,8 +223,8 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Depths of each bone in contact and the muscle in each other. Where its surface, whose triangles may be large, is deeper
-    than is allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
+    """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
+    allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
     contact, rest = problem.contact, ClosedSurface(run.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -245,8 +245,8 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 def _deep(
     bone: Bone, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
 ) -> RunCheck:
-    """Depth of a bone and the muscle in each other; beyond rest, where that is more than contact gives way. Never to the middle
-    of a bone.
+    """Penetration of a bone and the muscle; minus that at rest, where this exceeds the give of contact. Never up to the middle of
+    a bone.
     """
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
@@ -263,10 +263,10 @@ def _at_rest(muscle: ClosedSurface, bone: Bone) -> Depths:
 
 
 def _give(problem: MuscleProblem, bone: Bone, pressure: float) -> float:
-    """The depth [mm] allowed to a bone: the give of contact under the ``pressure`` [MPa] that was recorded, the error of the bone's
-    distance, and what is between points of contact.
+    """The allowed penetration [mm] of a bone: the give of contact under the recorded ``pressure`` [MPa], the error of the bone's
+    distance, and the part between contact points.
     """
-    assert problem.contact is not None  # called where there is contact
+    assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)
 
@@ -280,7 +280,7 @@ def _behind(surface: Surface, place: Floats) -> float:
 
 
 def _creases(run: Run) -> Iterator[RunCheck]:
-    """Reach of the muscle's surface through itself where it does not at rest."""
+    """Self-penetration of the muscle's surface where there is none at rest."""
     triangles, allowed = run.surface.triangles, np.array([_CREASE * spacing(run.surface)])
     at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))
     for i, number in _states(run, ()):

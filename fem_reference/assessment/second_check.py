@@ -1,4 +1,4 @@
-"""The second check of what a solver calls converged. A run that it denies has the status ``"denied"``: no truth, anywhere."""
+"""The second check of states that a solver calls converged. A run that it denies has status ``"denied"`` and is never a truth."""
 
 import hashlib
 import logging
@@ -20,12 +20,12 @@ from fem_reference.runs.store import Frame, Outcome, Run, collected
 
 log = logging.getLogger(__name__)
 
-# Where it stands in the origin of a run.
+# Its key in the origin of a run.
 RECORD = "second_check"
 
 
 def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
-    """An ``outcome`` that is converged, denied where one of the ``checks`` is not met."""
+    """A converged ``outcome``, denied where one of the ``checks`` is not met."""
     lost = [str(one) for one in checks if not one.met]
     if not lost or outcome.status != "converged":
         return outcome
@@ -33,9 +33,7 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 
 def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
-    """A ``run`` that ended as converged with the second check of it in its origin, stored with it; as it is where it has that of
-    this code.
-    """
+    """A converged ``run`` with its second check in the origin, stored with it; unchanged where it has the check of this code."""
     stored, code = run.origin.get(RECORD, {}), _code()
     if stored.get("code") == code:
         return run
@@ -52,7 +50,7 @@ def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
 
 
 def confirmed_frames(problem: MuscleProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
-    """The ``outcome`` of ``frames`` of a muscle that are not stored, denied where the check denies that they converged."""
+    """The ``outcome`` of ``frames`` of a muscle in memory, denied where the check denies that they converged."""
     if outcome.status != "converged":
         return outcome
     run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})
@@ -66,7 +64,7 @@ def _code() -> str:
 
 
 def texts_of(run: Run) -> tuple[str, ...]:
-    """The checks that are stored with a ``run``, in words, first those that deny it; none of one that was not checked."""
+    """The checks stored with a ``run``, in words, those that deny it first; empty for an unchecked one."""
     found = run.origin.get(RECORD, {}).get("checks", [])
     texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)

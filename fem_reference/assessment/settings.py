@@ -1,11 +1,11 @@
-"""Settings of solvers as they are the same on several cases, whose tetrahedra differ in size."""
+"""Settings of solvers, identified across cases whose tetrahedra differ in size."""
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import TETRAHEDRA, Point
 
 
 def setting(point: Point, study: CaseStudy) -> str:
-    """A key by which a setting is the same on two cases; tetrahedra count by their size in that of the case's own reference."""
+    """A key that identifies a setting across cases; tetrahedra count by their size relative to the case's own reference."""
     scene = point.choice.get("scene", {})
     if not is_elsewhere(point):
         return f"{study.case}: {point.label}"
@@ -18,12 +18,12 @@ def setting(point: Point, study: CaseStudy) -> str:
 
 
 def is_elsewhere(point: Point) -> bool:
-    """True where a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
+    """True where a setting can be used on another case: only mesh keys of a scene are transferable."""
     return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The size of the tetrahedra of a point in that of the case's own before refinement, and how much less they are refined."""
+    """The size of a point's tetrahedra relative to the case's own before refinement, and its difference in refinements."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]

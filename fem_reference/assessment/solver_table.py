@@ -57,8 +57,8 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time for a frame [s] where that is known, and
-    ``measures`` against the reference; those of the reference itself are its error bars, none where nobody asked.
+    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
+    against the reference; for the reference itself they are its error bars, none where these were not requested.
     """
 
     kind: str
@@ -80,8 +80,8 @@ class SolverResult:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene that solvers were run on: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement
-    ``travel`` [mm], and how the reference ended.
+    """A scene of the table: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement ``travel`` [mm],
+    and the outcome of the reference.
     """
 
     case: str
@@ -106,8 +106,8 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The ``results`` of all solvers on all of the ``scenarios``; ``missing``, by case, why it was left out; the
-    ``machines`` that runs were made on.
+    """The ``results`` of all solvers on all ``scenarios``; ``missing``: by case, the reason of omission; the ``machines`` of the
+    runs.
     """
 
     kinds: tuple[SolverKind, ...]
@@ -126,7 +126,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
-        """The worst frames of ``name`` over all scenarios; None where it was measured on none."""
+        """The worst frames of ``name`` over all scenarios; None where it was not measured."""
         found = [
             (value[0], one.case)
             for one in self.results
@@ -140,13 +140,13 @@ class Table:
         return Overall(float(np.median([abs(value) for value, _ in finite])), worst, case, len(finite), lost)
 
     def rankings(self, case: str) -> tuple[Ranking, ...]:
-        """The order of solvers on a case, as far as the reference's error bars separate them; nothing without these."""
+        """The order of solvers on a case, as far as the reference's error bars separate them; empty without bars."""
         here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
 
     def speed(self, kind: str, name: str) -> tuple[Scenario, float] | None:
-        """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""
+        """The scenario with the most triangles for which the time per frame [s] of ``name`` is known, and that time."""
         times = {
             one.case: one.seconds_per_frame
             for one in self.results

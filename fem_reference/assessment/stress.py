@@ -1,4 +1,4 @@
-"""Results of hard cases: a cell for each case and solver, with its verdict and what shows it."""
+"""Results of hard cases: a cell for each case and solver, with its verdict and the evidence."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ class Bound(Record):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where`` each is worst in words, the ``points``
-    (f, 3) [mm] there, where it is at a place.
+    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where`` each is worst in words, and the
+    ``points`` (f, 3) [mm] there, for a quantity with a place.
     """
 
     quantity: str
@@ -37,7 +37,7 @@ class History:
     points: Floats | None = None
 
     def worst(self, frame: Literal["any", "last"]) -> int:
-        """The index of the frame that counts; what is not a number is worst of all."""
+        """The index of the decisive frame; a value that is not a number is the worst."""
         if frame == "last":
             return len(self.values) - 1
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
@@ -54,9 +54,8 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A hard case by a solver: the verdict, a sentence on what happened, the status of the run (empty where there is none), the
-    decisive quantity's ``value``, ``bound`` and ``history``, which of its frames decided (``at``), and a picture of
-    the worst place.
+    """A hard case by a solver: the verdict, a sentence on the result, the status of the run (empty without a run), the decisive
+    quantity's ``value``, ``bound`` and ``history``, the index ``at`` of its decisive frame, and a picture of the worst place.
     """
 
     case: str
@@ -76,7 +75,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A row: the name, title, what a healthy run shows in words, and the bounds that say the same in numbers."""
+    """A row: the name, the title, the signs of a healthy run in words, and as bounds in numbers."""
 
     name: str
     title: str
@@ -86,7 +85,7 @@ class HardCase:
 
 @dataclass(frozen=True, eq=False)
 class Stress:
-    """All cells, the cases and the solvers in the order of the page; ``origin``: with what it was made."""
+    """All cells, the cases and the solvers in the order of the page; ``origin``: provenance."""
 
     cases: tuple[HardCase, ...]
     solvers: tuple[str, ...]
@@ -99,18 +98,18 @@ class Stress:
         return next(cell for cell in self.cells if (cell.case, cell.solver) == (case, solver))
 
     def count(self, solver: str) -> Counter[Verdict]:
-        """The number of cases of each verdict that a solver has."""
+        """The number of cases with each verdict for a solver."""
         return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
 
 
-_OTHER_REASONS = ("timed out", "crashed", "denied")  # that a run may have to end than that there is no solution
+_OTHER_REASONS = ("timed out", "crashed", "denied")  # endings of a run that do not mean that there is no solution
 Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, of a run that reached every frame, with the verdict of what it must keep: the first bound that is passed, else
-    the first of all. What is not finite has failed, whatever the status says; and so has a case that is to pass its bound, to
-    show a ``contrast``, and does not.
+    """``cell``, for a run that reached every frame, with the verdict on its bounds: by the first that is violated, else the first
+    of all. A value that is not finite fails, in spite of the status; so does a case that has to violate its bound as a
+    ``contrast``, and does not.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
@@ -123,8 +122,8 @@ def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, of a run that ended with a status: failed, or refused where it came to a limit point, or came some way and found
-    that there is ``no_solution``, for the reason given.
+    """``cell``, for a run that ended with another status: failed; or refused where it came to a limit point, or came some way and
+    found that there is ``no_solution``, for the given reason.
     """
     shown = _decisive(cell, weighed)
     if cell.status == "limit point":
@@ -136,8 +135,8 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about what the solver says that it found (none where that is empty): no plain success, and refused
-    where there is ``no_solution``.
+    """``cell`` with a ``doubt`` about the solver's own result (none where empty): no plain success, and refused where there is
+    ``no_solution``.
     """
     if not doubt or cell.verdict != "ok":
         return cell
@@ -147,7 +146,7 @@ def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
 
 
 def _decisive(cell: Cell, weighed: Weighed) -> Cell:
-    """``cell`` with the first quantity that is beyond its bound, else the first of all."""
+    """``cell`` with the first quantity that violates its bound, else the first of all."""
     values = [(bound, history, history.worst(bound.frame)) for bound, history in weighed]
     bound, history, i = next((one for one in values if not one[1].values[one[2]] <= one[0].at_most), values[0])
     where = f" {history.where[i]}" if history.where else ""
@@ -175,7 +174,7 @@ def _row(case: HardCase) -> dict[str, Any]:
 
 
 def facts(stress: Stress) -> dict[str, Any]:
-    """All that pages show but pictures, as valid JSON."""
+    """The contents of pages, except pictures, as valid JSON."""
     cells = []
     for cell in stress.cells:
         plain = {

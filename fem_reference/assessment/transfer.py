@@ -1,4 +1,4 @@
-"""Transfer of settings that are good on some cases to another: each case left out in turn."""
+"""Transfer of good settings from some cases to another: each case is left out in turn."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,8 +11,8 @@ from fem_reference.assessment.settings import is_elsewhere, setting
 
 @dataclass(frozen=True)
 class Transfer:
-    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and tried on that: their ``error`` there, the ``best``
-    error that any of the same settings has there, and the ``default``'s (NaN where there is none).
+    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and applied to that: their ``error`` there, the
+    ``best`` error of any of the same settings there, and that of the ``default`` (NaN where there is none).
     """
 
     solver: str
@@ -24,13 +24,13 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """The error over the least possible, less one: 0 where the settings chosen are the best there too."""
+        """The error over the least possible, minus one: 0 where the chosen settings are the best there too."""
         return self.error / self.best - 1
 
 
 def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
-    """For every solver and case, settings chosen by the least mean logarithm of the error over the other cases among those that
-    were measured on every case; an error below the bar of a truth counts as that.
+    """For every solver and case, the settings with the least mean logarithm of the error over the other cases, among those
+    measured on every case; an error below the bar of a truth counts as the bar.
     """
     by_solver: dict[str, dict[str, dict[str, float]]] = {}
     defaults: dict[tuple[str, str], float] = {}

@@ -1,4 +1,4 @@
-"""Two versions of one solver beside each other: what came nearer to the reference, what went further away, and where."""
+"""Two versions of one solver: the statistics that came nearer to the reference or went farther away, and their frames."""
 
 import math
 from collections.abc import Iterator
@@ -19,8 +19,8 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """The distances of a statistic from the reference, as it ``was`` and is ``now`` (f,), in ``unit``, at frame ``numbers``;
-    ``bars`` (f,): the error bars of the reference, NaN where nobody knows.
+    """The distances of a statistic from the reference, earlier (``was``) and ``now`` (f,), in ``unit``, at frame ``numbers``;
+    ``bars`` (f,): the error bars of the reference, NaN where unknown.
     """
 
     name: str
@@ -32,14 +32,14 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """The increase of the distance (f,), below 0 where it is nearer; infinite where a number was lost or found."""
+        """The increase of the distance (f,), negative where it is nearer; infinite where a number was lost or found."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))
 
     @property
     def at(self) -> int:
-        """The index of the frame that changed most, among those that changed by more than their error bar where there are such."""
+        """The index of the frame with the greatest change, if possible among changes that exceed their error bar."""
         change = self._counted if self._counted.any() else self.further
         return int(np.argmax(np.nan_to_num(np.abs(change), nan=-1.0, posinf=np.inf)))
 
@@ -50,7 +50,7 @@ class Change:
 
     @property
     def by(self) -> float:
-        """The change there, above 0 where it is further away; NaN where there is no number and was none."""
+        """The change there, positive where it is farther away; NaN without a number before and now."""
         return float(self.further[self.at])
 
     @property
@@ -60,25 +60,25 @@ class Change:
 
     @property
     def greatest(self) -> tuple[float, float]:
-        """The greatest distance from the reference that it had and has, NaN where it has no number."""
+        """The greatest earlier and present distance from the reference, NaN without a number."""
         was, now = (np.abs(values[np.isfinite(values)]) for values in (self.was, self.now))
         return float(was.max()) if len(was) else math.nan, float(now.max()) if len(now) else math.nan
 
     @property
     def in_bars(self) -> float:
-        """The change there in error bars, NaN where these are not known."""
+        """The change there in error bars, NaN where these are unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
     def size(self) -> float:
-        """The size that changes are sorted by: the change in error bars, without these as a share of what it was and is."""
+        """The size by which changes are sorted: the change in error bars, without these relative to the values before and now."""
         whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 
     @property
     def word(self) -> Word:
-        """The verdict on the change: less than rounding or than the error bar is neither, and "mixed" is nearer in some frames and
-        further away in others.
+        """The verdict on the change. A change below rounding or the error bar is neither; "mixed" is nearer in some frames and
+        farther away in others.
         """
         if math.isnan(self.by):
             return "no number"
@@ -91,7 +91,7 @@ class Change:
 
     @property
     def _counted(self) -> Floats:
-        """The changes (f,) that are more than rounding, their error bar and ``SHARE`` of the greatest; 0 for the others."""
+        """The changes (f,) that exceed rounding, their error bar and ``SHARE`` of the greatest; 0 for the others."""
         change = np.nan_to_num(self.further, nan=0.0, posinf=np.inf, neginf=-np.inf)
         finite = np.abs(change[np.isfinite(change)])
         least = max(10.0 ** -PLACES[self.unit], SHARE * float(finite.max(initial=0.0)))
@@ -99,7 +99,7 @@ class Change:
 
     @property
     def other(self) -> int | None:
-        """The index of the frame of what is mixed that changed most the other way; None of all else."""
+        """The index of the frame of a mixed change with the greatest opposite change; None for all others."""
         if self.word != "mixed":
             return None
         return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
@@ -107,8 +107,8 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Versions:
-    """``current`` against what it ``was``, in words: ``changes``, the worst first; how far each of the ``vertices`` (k,) is from
-    where it was, ``moved`` (f, k) [mm]; and the positions (f, n, 3) [mm] then, None where only some vertices are known.
+    """``current`` against an earlier state, ``was`` in words: ``changes``, the worst first; the distance ``moved`` (f, k) [mm] of
+    each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None where only some vertices are known.
     """
 
     current: CurrentMeasures
@@ -120,16 +120,16 @@ class Versions:
     differences: tuple[tuple[str, str, str], ...] = ()
 
     def count(self, word: Word) -> int:
-        """The number of statistics that changed so."""
+        """The number of statistics with this verdict."""
         return sum(one.word == word for one in self.changes)
 
     def of(self, word: Word) -> list[Change]:
-        """The statistics that changed so, the greatest change first."""
+        """The statistics with this verdict, the greatest change first."""
         return [one for one in self.changes if one.word == word]
 
     @property
     def place(self) -> tuple[int, int, float] | None:
-        """Frame index, vertex and distance [mm] of what moved most; None where nothing did."""
+        """Frame index, vertex and distance [mm] of the greatest motion; None without motion."""
         known = np.nan_to_num(self.moved, nan=-1.0)
         i, k = np.unravel_index(int(np.argmax(known)), known.shape)
         if known[i, k] <= POSITION_ROUNDING:
@@ -138,7 +138,7 @@ class Versions:
 
 
 def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Versions:
-    """Against another run of the same frames."""
+    """The versions, compared with another run of the same frames."""
     if current.points.shape != before.points.shape:
         raise InputError(
             "--against", f"{before.points.shape[1]} vertices", f"{current.points.shape[1]}, those of the candidate"
@@ -153,7 +153,7 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
 
 
 def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
-    """Against the measures and the sampled vertices of a baseline, rounded as they are there."""
+    """The versions, compared with the measures and sampled vertices of a baseline, rounded as there."""
     names = {name: stored.unit for name, stored in baseline.measures.items()}
     known = {name: stored.numbers for name, stored in baseline.measures.items()}
     vertices, then = np.array(baseline.positions.vertices), baseline.positions.points(len(current.rest), "--against")

@@ -1,13 +1,13 @@
 """Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
 Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, and one expression written once,
-with operators and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it
-in numpy. What acts in a body is an ``Effect`` of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its
-surface (a traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A
+with operators and the functions of ``Functions`` only, so that a solver can use it symbolically and a test can evaluate it
+in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
+traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A
 ``FieldEffect`` acts on a scalar field psi and has a weak form.
 
-A solver may hand symbols in place of an effect's parameters (so that a compiled form serves every value of them): an expression
-never branches on a parameter and computes with it by operators and ``state.functions`` only.
+A solver may replace an effect's parameters by symbols, so that a compiled form serves every value of them: an expression
+never branches on a parameter and uses it with operators and ``state.functions`` only.
 """
 
 import importlib
@@ -32,8 +32,8 @@ __path__ += outside.folders()
 
 
 class Moduli(NamedTuple):
-    """Stiffness at rest [MPa]: ``shear`` (of what has fibres, across them), ``bulk``, and the stress by which that of ``fibres`` is
-    given; 0 of what has none.
+    """Stiffness at rest [MPa]: ``shear`` (across the fibres, where there are some), ``bulk``, and the stress that scales the
+    stiffness of ``fibres``; 0 where there is none.
     """
 
     shear: float = 0.0
@@ -42,7 +42,7 @@ class Moduli(NamedTuple):
 
 
 class RampPoint(Record):
-    """A share of an effect that acts at a frame number: up to a thousand times what its parameters say."""
+    """The amount of an effect at a frame number: up to a thousand times its parameters."""
 
     frame: float
     amount: float = Field(ge=0, le=1000)
@@ -52,12 +52,12 @@ class RampPoint(Record):
 
 
 class Effect(Record):
-    """A frozen record of parameters of what acts in a body.
+    """A frozen record of the parameters of an effect on a body.
 
-    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, of the frames,
-    ``"interval"``: the time from a frame number to the next, or of a step, ``"momentum"``: velocities and where these lead;
-    ``outer``: True where it acts from outside the body, so that its forces are not in balance by themselves; ``example``: of its
-    parameters as scene files write them, beside those of its kind.
+    ``unknowns``: names of the fields that it adds; ``needs``: its requirements: of the rest state, ``"fibre"``; of the frames,
+    ``"interval"``, the time between frame numbers; of a step, ``"momentum"``, velocities and predicted displacements;
+    ``outer``: True where it acts from outside the body, so that its forces do not balance by themselves; ``example``: some of its
+    parameters, as scene files write them, besides those of its kind.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -66,11 +66,11 @@ class Effect(Record):
     example: ClassVar[dict[str, Any]] = {}
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
-        """The share of it that acts at a frame: all of it, unless it has a ramp."""
+        """The amount of it that acts at a frame: 1, unless it has a ramp."""
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
-        """The ranges that it is meant for; none unless its docstring gives one."""
+        """The ranges of its validity; none unless its docstring gives one."""
         return ()
 
     def moduli(self) -> Moduli:
@@ -78,12 +78,14 @@ class Effect(Record):
         return Moduli()
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
-        """The evidence that a scene needs it, known before it is solved; None of what is part of the material: always."""
+        """The evidence that a scene needs it, known before a solution; None for a part of the material, which is always
+        needed.
+        """
         return None
 
     @property
     def title(self) -> str:
-        """Its name beside the other effects of a scene."""
+        """Its name among the effects of a scene."""
         return type(self).__name__
 
     @property
@@ -93,7 +95,7 @@ class Effect(Record):
 
 
 class Ramped(Effect):
-    """An effect with a ramp: ``ramp`` says how much of it acts, linearly between its knots, constant beyond them."""
+    """An effect with a ramp: ``ramp`` gives its amount, linear between its knots, constant beyond them."""
 
     example: ClassVar[dict[str, Any]] = {"ramp": [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}]}
     ramp: tuple[RampPoint, ...] = Field(min_length=1)
@@ -106,13 +108,13 @@ class Ramped(Effect):
         return ramp
 
     def amount(self, frame: float) -> float:
-        """The share of it that acts at a frame."""
+        """The amount of it that acts at a frame."""
         frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.ramp), strict=True)
         return float(np.interp(frame, frames, amounts))
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume; ``stored``: whether it can be had back."""
+    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable."""
 
     stored: ClassVar[bool] = True
 
@@ -122,7 +124,7 @@ class Energy(Effect):
 
 
 class Load(Effect):
-    """A load on a part of the surface; ``on`` names it."""
+    """A load on the part ``on`` of the surface."""
 
     outer: ClassVar[bool] = True
     example: ClassVar[dict[str, Any]] = {"on": "top"}
@@ -130,20 +132,20 @@ class Load(Effect):
 
     @property
     def title(self) -> str:
-        """Its name beside the other effects of a scene, other loads of its kind among them."""
+        """Its name among the effects of a scene, which may include other loads of its kind."""
         return f"{type(self).__name__} on {self.on}"
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
-        """Force per rest area [MPa], (3,), where ``normal`` (3,) is the outward unit normal at rest."""
+        """Force per rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""
         raise NotImplementedError(f"{type(self).__name__} has no traction")
 
 
 class Interaction(Effect):
-    """An effect between a body and the rigid bodies around it, which a problem makes of a scene."""
+    """An effect between a body and the bones around it, which a problem makes from a scene."""
 
 
 class Prestrain(Effect):
-    """An effect that changes what is elastic of the deformation."""
+    """An effect that changes the elastic part of the deformation."""
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
         """The deformation gradient (3, 3) that the energies see."""
@@ -151,7 +153,7 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """``state`` with the F that the energies of ``acting`` see: the elastic one, where there is a prestrain."""
+    """``state`` with the F that the energies of ``acting`` see: the elastic one with a prestrain."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
@@ -161,7 +163,7 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient. A prestrain changes F before the step as it does F now: its own ramp moves nothing.
+    deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
@@ -169,7 +171,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 
 
 def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
-    """The force per rest area [MPa] along fibres of a ``stretch`` whose volume stays, by central differences of the energy."""
+    """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of the energy."""
 
     def energy(along: float) -> float:
         across = along**-0.5
@@ -181,7 +183,7 @@ def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
 
 @dataclass(frozen=True)
 class FieldState:
-    """A scalar function at a point: its ``value``, ``gradient`` (one entry a coordinate) and, of an unknown, ``laplacian``."""
+    """A scalar function at a point: its ``value``, ``gradient`` (one entry per coordinate) and, for an unknown, ``laplacian``."""
 
     value: Any
     gradient: Sequence[Any]
@@ -190,8 +192,8 @@ class FieldState:
 
 @dataclass(frozen=True)
 class Place:
-    """A point that a field effect acts at: the ``position`` (x, y, z as far as there are), the ``functions`` of formulas, and
-    ``upper``, the share of the element that lies above the mean y of the vertices.
+    """A point at which a field effect acts: the ``position`` (x, y, z as far as they exist), the ``functions`` of formulas, and
+    ``upper``, the share of the element above the mean y of the vertices.
     """
 
     position: Sequence[Any]
@@ -201,7 +203,7 @@ class Place:
 
 class FieldEffect(Record):
     """A frozen record of parameters with a term of ``-div(k grad psi) + v . grad psi + c psi - f = 0`` (report eq. 4.4, whose
-    A, B, C and D f are -k, v, c and f). ``example``: of its parameters as scene files write them.
+    A, B, C and D f are -k, v, c and f). ``example``: some of its parameters, as scene files write them.
     """
 
     example: ClassVar[dict[str, Any]] = {}
@@ -216,7 +218,7 @@ class FieldEffect(Record):
 
 
 def names(kind: type[Record] = Effect) -> list[str]:
-    """The effects of a ``kind`` that there are, as scene files name them."""
+    """The existing effects of a ``kind``, by their names in scene files."""
     return sorted(module.name for module in pkgutil.iter_modules(__path__) if issubclass(_record(module.name), kind))
 
 
@@ -240,7 +242,7 @@ def moduli(acting: Iterable[Record]) -> Moduli:
 
 
 def _record(name: str) -> type[Record]:
-    """The record in the file of the effect ``name``, which is there."""
+    """The record in the file of the existing effect ``name``."""
     return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, (Effect, FieldEffect))
 
 

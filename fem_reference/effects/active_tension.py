@@ -19,7 +19,7 @@ class ActiveTension(Ramped, Energy):
     tension: PositivePressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which fibres that pull straighten the muscle, or shorten it where they can."""
+        """The distance by which active fibres straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.tension
         return Indicator(
             "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull

@@ -1,4 +1,4 @@
-"""Frictionless contact of bones with the muscle, with any sliding; what is attached is exempt, and what is near to it."""
+"""Frictionless contact of bones with the muscle, with any sliding; attached parts and parts near to them are exempt."""
 
 import math
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ class Contact(Interaction):
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The depth to which the surface may get into bones, and the pressure there."""
+        """The possible penetration of the surface into bones, and the pressure there."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
         depth = math.hypot(*(one.depth for one in near.values()))

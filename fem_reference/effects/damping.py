@@ -1,4 +1,4 @@
-"""Drag of the ground on tissue that moves: a body that is not fixed does not drift away, and an unstable state is left in time."""
+"""Drag of the ground on moving tissue: a free body does not drift away, and an unstable state is left over time."""
 
 from typing import Any, ClassVar
 

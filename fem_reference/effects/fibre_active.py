@@ -1,4 +1,4 @@
-"""Muscle fibres that pull as they are activated, most at their optimal length."""
+"""Active muscle fibres: a tension by activation, greatest at their optimal length."""
 
 from typing import Any, ClassVar
 
@@ -30,7 +30,7 @@ class FibreActive(Ramped, Energy):
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which fibres that pull straighten the muscle, or shorten it where they can."""
+        """The distance by which active fibres straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.stress
         return Indicator(
             "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull

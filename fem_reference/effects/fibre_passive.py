@@ -1,4 +1,4 @@
-"""Muscle fibres that resist being stretched beyond their optimal length: a toe, then a line."""
+"""Passive muscle fibres: resistance to stretch beyond their optimal length, by a toe and a line."""
 
 from typing import Any, ClassVar
 
@@ -41,7 +41,7 @@ class FibrePassive(Energy):
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """Their pull at the greatest stretch that is to be expected, against the matrix."""
+        """The tension of the fibres at the greatest expected stretch, against the matrix."""
         pull = fibre_tension(self, scene.stretch[1])
         return Indicator(
             "tension of the fibres over the shear modulus",

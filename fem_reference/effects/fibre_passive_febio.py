@@ -1,4 +1,4 @@
-"""Fibres that resist being stretched, by the law of FEBio: a toe, then a line in the stretch."""
+"""Passive fibres by the law of FEBio: resistance to stretch by a toe, then a line in the stretch."""
 
 from typing import Any, ClassVar
 
@@ -9,7 +9,7 @@ from fem_reference.effects import Energy, State, fibre_tension
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PositivePressure
 
-# On (0, 1), as plain numbers: those of numpy would draw symbols into arrays.
+# On (0, 1), as Python floats: numpy numbers would turn symbols into arrays.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=True))
 
@@ -31,7 +31,7 @@ class FibrePassiveFebio(Energy):
     linear_from: float = Field(gt=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """Their pull at the greatest stretch that is to be expected, against the matrix."""
+        """The tension of the fibres at the greatest expected stretch, against the matrix."""
         pull = fibre_tension(self, scene.stretch[1])
         return Indicator(
             "tension of the fibres over the shear modulus",

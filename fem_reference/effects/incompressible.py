@@ -1,4 +1,4 @@
-"""Near-incompressibility by a pressure unknown of its own (mixed form)."""
+"""Near-incompressibility with a pressure unknown (mixed form)."""
 
 from typing import Any, ClassVar
 

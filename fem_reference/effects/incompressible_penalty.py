@@ -1,4 +1,4 @@
-"""Near-incompressibility by a penalty on volume change, without an unknown of its own: it locks where the mixed form does not."""
+"""Near-incompressibility by a penalty on volume change, without a pressure unknown: it locks where the mixed form does not."""
 
 from typing import Any, ClassVar
 

@@ -32,10 +32,10 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a beam: its first frequency is that of the beam that its own weight bends by as much; by the force
-        of its acceleration, and the stress of a wave that a jump of velocity sends through it.
+        """The lag of a beam, from the force of its acceleration, and the stress of the wave that a jump of velocity sends through
+        it. The first frequency of the beam follows from its deflection under its own weight.
         """
-        square = scene.bend(self.density)  # of one over the frequency
+        square = scene.bend(self.density)  # the inverse square of the frequency
         acceleration, jump = scene.in_time(scene.in_time(scene.acceleration)), scene.in_time(scene.jump)
         lag = scene.lag(max(square * acceleration, math.sqrt(square) * jump))
         stress = max(self.density * acceleration * scene.length, math.sqrt(self.density * scene.shear) * jump)
@@ -52,20 +52,20 @@ class Inertia(Energy):
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement [mm] that a step of so many ``seconds`` goes to without forces, from ``u`` with velocity ``v`` and
-        acceleration ``a`` (arrays of one shape).
+        """The displacement [mm] after a step of ``seconds`` without forces, from ``u`` with velocity ``v`` and acceleration ``a``
+        (arrays of one shape).
         """
         alpha, _, beta = self._rule()
         return u + seconds * v + seconds**2 * (0.5 - beta - beta * alpha / (1 - alpha)) * a
 
     def advanced(self, u: Any, v: Any, a: Any, now: Any, seconds: float) -> tuple[Any, Any]:
-        """Velocity and acceleration after a step of so many ``seconds`` from ``u`` to ``now``."""
+        """Velocity and acceleration after a step of ``seconds`` from ``u`` to ``now``."""
         _, gamma, beta = self._rule()
         after = (now - u - seconds * v - seconds**2 * (0.5 - beta) * a) / (beta * seconds**2)
         return v + seconds * ((1 - gamma) * a + gamma * after), after
 
     def begun(self, u: Any, seconds: float) -> Any:
-        """The acceleration of what was at rest and is displaced by ``u`` after so few ``seconds`` that forces are the same."""
+        """The acceleration of a body at rest that moves by ``u`` in ``seconds`` so short that forces do not change."""
         return 2 * (1 + self.spectral_radius) * u / seconds**2
 
     def _rule(self) -> tuple[float, float, float]:

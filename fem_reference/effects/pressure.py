@@ -22,7 +22,7 @@ class Pressure(Ramped, Load):
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it presses the thickness together."""
+        """The distance by which it compresses the thickness."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)

@@ -1,4 +1,4 @@
-"""A dead load: a force on a part of the surface that keeps its direction and its size as the surface moves."""
+"""A dead load: a force on a part of the surface with constant direction and size."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ class Traction(Ramped, Load):
     force: PressureVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it pulls the length."""
+        """The distance by which it extends the length."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
         return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)

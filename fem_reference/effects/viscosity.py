@@ -28,7 +28,7 @@ class Viscosity(Energy):
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The part of its travel by which a body lags behind in the time in which it relaxes."""
+        """The lag of a body, as a part of its travel, over its relaxation time."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         return Indicator(

@@ -1,4 +1,4 @@
-"""Grids of boxes, each cut into Kuhn's six tetrahedra, all in the same directions: they nest where one grid refines another.
+"""Grids of boxes, each cut into Kuhn's six tetrahedra in the same directions: refined grids are nested.
 
 A cell is cut along the diagonal from its lowest to its highest corner, and so is every face of it.
 """
@@ -13,11 +13,11 @@ from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
 
-_SAME = 1e-6  # of the largest edge: what single precision leaves of a coordinate
+_SAME = 1e-6  # of the largest edge: the precision of a single-precision coordinate
 
 
 def fill(surface: Surface, size: float) -> TetMesh:
-    """The axis-aligned box that a closed outward ``surface`` is, as a grid of boxes with edges of about ``size`` [mm].
+    """The axis-aligned box with the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
 
     InputError where it is another body, or where ``size`` is far too small or too large.
     """
@@ -50,7 +50,7 @@ def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
 
 
 def _sheet(counts: Counts, axis: int, end: int) -> Ints:
-    """The corners (m, 3, 3) of the outward triangles on a face of a lattice across ``axis``, the low or the high ``end`` of it."""
+    """The corners (m, 3, 3) of the outward triangles on the face of a lattice at the low or high ``end`` of an ``axis``."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
     lowest = np.zeros((counts[one] * counts[other], 3), np.int64)
     lowest[:, [one, other]] = np.indices((counts[one], counts[other])).reshape(2, -1).T
@@ -61,9 +61,9 @@ def _sheet(counts: Counts, axis: int, end: int) -> Ints:
 
 
 def _extent(surface: Surface) -> tuple[Floats, Floats]:
-    """The lowest and the highest corner (3,) of the axis-aligned box that ``surface`` is; InputError where it is none.
+    """The lowest and the highest corner (3,) of the axis-aligned box with this ``surface``; InputError where it is no box.
 
-    Each triangle lies in one face of the box around them all, and together they go round it once.
+    Each triangle lies in one face of the bounding box, and together they wind round it once.
     """
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = _SAME * float((high - low).max())

@@ -1,4 +1,4 @@
-"""The length that one can go from a point, whatever the direction, before a tricubic spline on a grid falls to a level."""
+"""The distance from a point, in any direction, within which a tricubic spline on a grid stays above a level."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ _CHUNK = 20_000  # cells at once
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """``away`` (i, j, k): how far [mm] each node is from the nearest cell in which the spline may be as low as the level. Nodes are
-    ``spacing`` [mm] apart, the first at ``origin``; beyond the last ones there is nothing as low.
+    """``away`` (i, j, k): the distance [mm] from each node to the nearest cell in which the spline may fall to the level. Nodes
+    are ``spacing`` [mm] apart, the first at ``origin``; the spline stays above the level beyond the last ones.
     """
 
     away: Floats
@@ -32,13 +32,14 @@ class Clearance:
         nodes = np.rint(within).astype(np.int64)
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
-        # The grid is convex: from beyond it, the way on from the nearest point of it makes no acute angle with that to it.
+        # The grid is convex: from a point outside, the path beyond its nearest grid point makes no acute angle with the
+        # path to it.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 
 
 def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float) -> Clearance:
-    """The clearance of a spline with ``coefficients`` (i, j, k) of the B-splines about nodes, which has values between the second
+    """The clearance of a spline with ``coefficients`` (i, j, k) of the B-splines about nodes; it has values between the second
     nodes from either end.
     """
     low = _may_be_low(coefficients, level)
@@ -50,9 +51,9 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
-    """In which cells, three fewer along each axis, a spline may be at ``level`` or below: it is no lower than the least of the
-    64 coefficients that reach into it, and than the least of its Bernstein coefficients. Nor is it above the greatest of them:
-    deep inside nothing is left to ask.
+    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. It is no lower than the
+    least of the 64 coefficients of its cell, and than the least of its Bernstein coefficients. Nor is it above the greatest of
+    them: cells deep inside need no check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))
@@ -65,7 +66,7 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least of four neighbours along each axis, each of which gets shorter by three."""
+    """The least of four neighbours along each axis, which gets shorter by three."""
     for axis in range(values.ndim):
         windows = [values[(slice(None),) * axis + (slice(i, values.shape[axis] - 3 + i),)] for i in range(4)]
         pairs = np.minimum(windows[0], windows[1]), np.minimum(windows[2], windows[3])

@@ -1,4 +1,4 @@
-"""A coarser surface of well-shaped triangles that lies on a fine one, or the same surface of more."""
+"""A coarser surface of well-shaped triangles on a fine one, or the same surface with more triangles."""
 
 import igl
 import numpy as np
@@ -34,8 +34,8 @@ def coarsen(surface: Surface, count: int) -> Surface:
 
 
 def resampled(surface: Surface, power: int) -> Surface:
-    """``surface`` with ``4**power`` times as many triangles: each cut into four where ``power`` is above 0, so often, which moves
-    nothing and leaves its vertices the first; else coarsened.
+    """``surface`` with ``4**power`` times as many triangles. For positive ``power`` each triangle is cut into four, repeatedly,
+    which moves nothing and keeps its vertices first; else it is coarsened.
     """
     if power < 0:
         return coarsen(surface, max(4, round(len(surface.triangles) * 4**power)))
@@ -74,9 +74,9 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """The part (k, 3) of displacements of points on a surface that does not leave it: in a smooth place the part in the tangent
-    plane, at a sharp edge that along the edge, at a corner 0. The surface has ``points`` (n, 3) [mm] and ``triangles`` (m, 3); of
-    its points those ``chosen`` (k,) are displaced, by ``steps`` (k, 3) [mm].
+    """The part (k, 3) of displacements that stays on a surface: in a smooth place the tangential part, at a sharp edge the part
+    along the edge, at a corner 0. The surface has ``points`` (n, 3) [mm] and ``triangles`` (m, 3); its points ``chosen`` (k,) are
+    displaced by ``steps`` (k, 3) [mm].
     """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)
@@ -109,8 +109,8 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
-    """The triangles (m, 3) of a closed surface after its edges are flipped towards Delaunay, until none is left to flip (at most 20
-    passes). Edges between triangles of different ``labels`` (m,) stay, so that the labels are valid for what is returned.
+    """The triangles (m, 3) of a closed surface after edge flips towards Delaunay, until no flip is left (at most 20 passes).
+    Edges between triangles of different ``labels`` (m,) stay, so that the labels remain valid.
     """
     for _ in range(20):
         flipped = _flip_once(points, triangles, labels)
@@ -121,7 +121,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """Edges worth a flip flipped, the best first, each triangle at most once; the same array where none is."""
+    """The triangles after flips of worthwhile edges, the best first, each triangle at most once; the same array without flips."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -144,7 +144,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
     """The excess (e,) [rad] of the angles opposite to each edge over a straight one.
 
-    0 where a flip is not worth it, or the two triangles are not nearly in one plane before and after.
+    0 where a flip is not worthwhile, or the two triangles are not nearly in one plane before and after.
     """
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi

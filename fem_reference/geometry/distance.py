@@ -35,7 +35,7 @@ def distances(points: Floats, surface: Surface) -> Distances:
     )
     tree = _tree(vertices.tobytes(), triangles.tobytes())
     squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
-    lost = ~np.isfinite(squares)  # what libigl says of places whose squares overflow is left from anything
+    lost = ~np.isfinite(squares)  # libigl's results are arbitrary where squares overflow
     triangle[lost], closest[lost] = 0, vertices[triangles[0, 0]]
     corners = surface.points[surface.triangles[triangle]]
     return Distances(
@@ -43,7 +43,7 @@ def distances(points: Floats, surface: Surface) -> Distances:
     )
 
 
-# A surface is often asked for few points at a time, and its tree takes as long as thousands of them.
+# A surface is often queried for few points at a time, and building its tree takes as long as thousands of them.
 @lru_cache(maxsize=8)
 def _tree(points: bytes, triangles: bytes) -> igl.AABB:
     """The boxes around parts of the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""

@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
-# A point that round-off leaves between two tets is looked for again this far away, as a share of the mesh's diagonal.
+# A point that round-off leaves between two tets is searched again at this distance, as a share of the mesh's diagonal.
 _NUDGE = 1e-9
 # A closest point whose weight for a corner is below this lies on the edge or corner opposite.
 _TIE = 1e-9
@@ -16,7 +16,7 @@ _TIE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """For each of n points its tet, its coordinates there, and how far outside the mesh it is.
+    """For each of n points its tet, its coordinates there, and its distance outside the mesh.
 
     ``tets`` (n,), ``barycentric`` (n, 4), ``outside`` (n,) [mm], 0 inside. Outside, the tet is the one behind the
     closest boundary triangle and its coordinates extrapolate (some are negative).
@@ -32,7 +32,7 @@ class Embedding:
 
 
 class Locator:
-    """Search trees over a mesh, for those who embed many times."""
+    """Search trees over a mesh, for repeated embedding."""
 
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
@@ -57,8 +57,8 @@ class Locator:
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
-        """The closest boundary triangles (n,); a closest point on an edge or corner is in several, and round-off must not choose
-        between their tets, which extrapolate differently: the first of them is taken.
+        """The closest boundary triangles (n,). A closest point on an edge or corner is in several, whose tets extrapolate
+        differently: the first is taken, so that round-off does not choose.
         """
         chosen = np.array(skin.triangle)
         for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):

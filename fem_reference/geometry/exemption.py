@@ -1,4 +1,4 @@
-"""The part of a surface that is exempt from contact: what is attached, and what is near to that on the same side."""
+"""The part of a surface that is exempt from contact: attached parts, and parts near to them on the same side."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.pieces import Pieces, cut
 from fem_reference.geometry.skins import Skin, embedded, points, spacing
 
-# Facing more than 120 degrees away from what is attached is the other side of a thin body.
+# A part that faces more than 120 degrees away from an attached part is on the other side of a thin body.
 _SAME_SIDE = -0.5
-# Corners are looked at this share of the way to the middle of their piece: on an edge it has one side.
+# Corners are sampled at this share of the path to the middle of their piece: on an edge that has one side.
 _INWARD = 1e-3
 
 
 class Corners(NamedTuple):
-    """The different corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) that gives their places by those of the
-    vertices, how far ``away`` (k,) [mm] they are from what is attached, 0 on it, and the number ``by`` (k,) of that attachment;
-    which corners ``at`` (p, 3) a piece has, and which of them the ``vertices`` (n,) are.
+    """The distinct corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) from positions of the vertices to
+    theirs, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the number ``by`` (k,) of that attachment; the
+    corners ``at`` (p, 3) of each piece, and those at the ``vertices`` (n,).
     """
 
     carried: csr_array
@@ -35,11 +35,11 @@ class Corners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """The part of a ``surface`` that is exempt from contact: on its ``part`` (r, 3, 3) that is attached, as triangles, each ``by``
-    (r,) the number of an attachment, to bones of these ``names``, and within ``reach`` [mm] of that on the same side.
+    """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each ``by`` (r,) the
+    number of an attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
 
-    The reach is the distance of the points at which contact is felt, ``spacing``: nearer to what is attached, a point stands for
-    area that is attached too. It depends on the size of the surface and not on its triangles.
+    The reach is the ``spacing`` of the contact points: nearer to the attached part, a point would stand for attached area
+    too. It depends on the size of the surface and not on its triangles.
     """
 
     surface: Surface
@@ -50,8 +50,8 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """The exemption of a surface with, by attachment, the name of what it is ``attached`` to, and the shares (m, 3) of the
-        corners of its triangles, 1 or 0; the part is where shares, linear in triangles, are a half and more.
+        """The exemption of a surface. ``attached``: by attachment, the name of the bone and the shares (m, 3) of the corners of
+        the triangles, 1 or 0; the attached part is where shares, linear in triangles, are at least a half.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
@@ -61,8 +61,8 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from what is attached, infinite where that faces away,
-        and by which attachment (k,).
+        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite where that faces
+        away, and the number of its attachment (k,).
         """
         if len(self.part) == 0:
             return np.full(len(points), np.inf), np.full(len(points), -1)
@@ -74,12 +74,12 @@ class Exemption:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The whole surface, cut as fine as contact is felt."""
+        """The whole surface, cut into pieces of the spacing of contact points."""
         return cut(self.surface, np.arange(len(self.surface.triangles)), self.reach)
 
     @cached_property
     def corners(self) -> Corners:
-        """The corners of the pieces, each as the piece sees it that is nearest to what is attached."""
+        """The corners of the pieces, each with the distance from its piece nearest to the attached part."""
         triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
         weights = pieces.corners.reshape(-1, 3)
         named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
@@ -97,29 +97,29 @@ class Exemption:
         return Corners(carried, away[nearest], by[nearest], at.reshape(-1, 3), vertices)
 
     def _corners_away(self) -> tuple[Floats, Ints]:
-        """The result of ``away`` for each corner of each piece (3 p,), 0 on what is attached."""
+        """The result of ``away`` for each corner of each piece (3 p,), 0 on the attached part."""
         inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
         away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
         return np.where(away > _INWARD / 10 * self.reach, away, 0.0), by
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
-        """Mask (n,) of the vertices that are exempt, as seen from any triangle around them."""
+        """Mask (n,) of the exempt vertices: those exempt in any triangle around them."""
         return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
 
     @cached_property
     def felt(self) -> NDArray[np.bool_]:
-        """In the middle of which pieces (p,) contact is felt."""
+        """Mask (p,) of the pieces with contact in their middle."""
         return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
 
     def places(self, count: int) -> csr_array:
-        """About so many places where contact is felt, evenly chosen: the matrix that gives them by those of the vertices."""
+        """About ``count`` evenly chosen places with contact: the matrix from positions of the vertices to theirs."""
         felt = np.flatnonzero(self.corners.away > self.reach)
         return self.corners.carried[felt[:: max(1, len(felt) // count)]]
 
     @cached_property
     def lost(self) -> float:
-        """The share of what is not attached where contact is not felt; 1 where all is attached."""
+        """The share of the unattached surface without contact; 1 where all is attached."""
         areas = corner_areas(self._places)
         loose = areas.sum() - corner_areas(self.part).sum()
         return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0
@@ -131,8 +131,8 @@ class Exemption:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of a surface where contact is felt, beside what is ``exempt`` of it: at most ``apart`` [mm] from each
-    other on average, carried by the tetrahedra of a ``mesh``.
+    """The material points of a surface with contact, outside its ``exempt`` part: at most ``apart`` [mm] from each other on
+    average, carried by the tetrahedra of a ``mesh``.
     """
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)

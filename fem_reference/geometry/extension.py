@@ -12,7 +12,7 @@ from fem_reference.geometry.distance import distances
 
 # Closer to the surface than this share of its diagonal a point counts as on it.
 _ON = 1e-10
-# A triangle whose plane passes the point at a sine below this counts as seen edge on: it covers no solid angle.
+# A triangle whose plane passes the point at a sine below this counts as edge-on: its solid angle is 0.
 _EDGE_ON = 1e-10
 
 
@@ -42,13 +42,13 @@ class Extension:
         return cls(points, rest.points, weights)
 
     def apply(self, positions: Floats) -> Floats:
-        """The places of the points (m, 3) [mm] when the surface's points are at ``positions`` (n, 3) [mm]."""
+        """The positions of the points (m, 3) [mm] for surface points at ``positions`` (n, 3) [mm]."""
         return np.asarray(self.points + self.weights @ (positions - self.rest))
 
 
 class _Edges:
-    """The e edges of m ``triangles`` (m, 3), each met once: its ``ends`` (2, e); and for each corner of the triangles the edge
-    ``opposite`` to it (3, m), which they go along in the ``sense`` (3, m) of 1 or -1.
+    """The e edges of m ``triangles`` (m, 3), each once: its ``ends`` (2, e); and for each corner of the triangles the edge
+    ``opposite`` to it (3, m), with the ``sense`` (3, m) of the triangle along it, 1 or -1.
     """
 
     def __init__(self, triangles: Ints) -> None:
@@ -60,7 +60,7 @@ class _Edges:
 
 
 def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:
-    """The weights (n,) that a point off the surface has for the ``rest`` (n, 3) of its corners.
+    """The weights (n,) of the ``rest`` (n, 3) corners for a point off the surface.
 
     The unit vectors u_i to the corners of a triangle span a spherical triangle. With c_i the vector product of the other two, s_i
     its length and theta_i the angle between them, its mean vector is m = 1/2 sum theta_i c_i / s_i, and corner i at the distance

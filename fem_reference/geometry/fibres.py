@@ -19,19 +19,19 @@ from fem_reference.geometry.nested import EDGES
 
 _POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
-# Seeds that differ by less, relatively, are distinguished by their number, so that a turned mesh gives the same lines.
+# Seeds whose relative difference is less are ordered by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
-_HALFWAY = 0.5 - _TIES  # where the field is 1/2 but for round-off it is above
+_HALFWAY = 0.5 - _TIES  # a field of 1/2 up to round-off is above it
 
 Bools = NDArray[np.bool_]
-# Of cells (n,) and rest points (n, 3) in them: unit vectors (n, 3); picklable.
+# From cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); picklable.
 Directions = Callable[[Ints, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
 class FibreField:
-    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of a ``mesh`` of its own, 0
-    on the triangles ``start`` (m, 3), 1 on ``end``.
+    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of its own ``mesh``, 0 on
+    the triangles ``start`` (m, 3), 1 on ``end``.
     """
 
     mesh: TetMesh
@@ -41,11 +41,11 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields that are not made from others: the rest is not passed to other processes."""
+        """The fields that do not derive from others; only these are passed to other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), whatever ``cells`` they are in."""
+        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), independent of their ``cells``."""
         found = self.directions(points)
         flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all around is one attachment
         if flat.any():
@@ -70,7 +70,7 @@ class FibreField:
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
 
     def between_attachments(self, points: Floats) -> Bools:
-        """Mask (m,) of the ``points`` (m, 3) that are in the mesh and at no attachment."""
+        """Mask (m,) of the ``points`` (m, 3) that are in the mesh and on no attachment."""
         embedding = self.locator.embed(points)
         values = embedding.interpolate(self.mesh, self.values)
         return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
@@ -116,7 +116,7 @@ class NearestLine:
     lines: Polylines
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields that are not made from others."""
+        """The fields that do not derive from others."""
         return {"lines": self.lines}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
@@ -181,14 +181,14 @@ def _spread(points: Floats, count: int) -> Floats:
 
 
 def _first_best(scores: Floats) -> int:
-    """The first index whose score is the greatest but for round-off."""
+    """The first index whose score is the greatest up to round-off."""
     return int(np.argmax(scores >= scores.max() - _TIES * np.abs(scores).max()))
 
 
 def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[list[Floats], Bools]:
     """Lines from ``seeds`` (k, 3) along the field (``sign`` 1) or against it (-1) to the attachment ``goal`` (m, 3).
 
-    And which of them came there rather than out of the skin, (k,).
+    The mask (k,) is True for lines that arrived there instead of leaving through the skin.
     """
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]

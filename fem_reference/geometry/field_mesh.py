@@ -1,4 +1,4 @@
-"""Intervals and triangles that a scalar field lives on, in the plane or in space: what they measure, their rim, their refinement.
+"""Meshes of scalar fields: intervals and triangles, in the plane or in space; their sizes, boundary and refinement.
 
 Vocabulary of shapes: points ``(n, d)`` with d from 1 to 3, cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
 """
@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Floats, Ints, read_only
 
 @dataclass(frozen=True, eq=False)
 class FieldMesh:
-    """Straight ``cells`` between ``points``; ``place`` says where they came from, for messages."""
+    """Straight ``cells`` between ``points``; ``place`` is their source, for messages."""
 
     points: Floats
     cells: Ints
@@ -55,13 +55,13 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
-# No coordinate is larger: areas and what is made of them are numbers still.
+# No coordinate is larger, so that areas and results computed from them are finite.
 FURTHEST = 1e50
 
 
 def check(mesh: FieldMesh) -> FieldMesh:
-    """``mesh`` itself; InputError where a number is not finite, a vertex is none or in no cell, a cell is flat, or three triangles
-    share an edge.
+    """``mesh`` itself; InputError where a number is not finite, a vertex index is invalid, a vertex is in no cell, a cell is
+    flat, or three triangles share an edge.
     """
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
@@ -93,7 +93,7 @@ def barycentric_gradients(mesh: FieldMesh) -> Floats:
 
 
 def share_above(mesh: FieldMesh, level: float) -> Floats:
-    """The share (m,) of each triangle's area that has y above ``level``."""
+    """The share (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
     # The corner that is alone on its side cuts off a triangle similar in two directions.

@@ -8,12 +8,12 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, normals
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """The triangles (k,), sorted, that an edge of another triangle pierces or whose edge pierces another."""
+    """The triangles (k,), sorted, that intersect another triangle through an edge of either."""
     return np.unique(self_crossings(surface))
 
 
 def self_crossings(surface: Surface) -> Ints:
-    """Pairs (k, 2) of triangles of which an edge of one pierces the other.
+    """Pairs (k, 2) of triangles where an edge of one pierces the other.
 
     An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap
     in one plane.
@@ -49,15 +49,15 @@ def _reaching(surface: Surface, low: Floats, high: Floats) -> Ints:
 
 
 def overlaps(one: Floats, other: Floats) -> Floats:
-    """Reach (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross through each other: the shorter of the displacements
-    across either that bring the other to one side of it; 0 where either has no area.
+    """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shorter of the displacements across
+    either that bring the other to one side of it; 0 where either has no area.
     """
     reaches = np.stack([_reach(one, other), _reach(other, one)])
     return np.asarray(np.nan_to_num(reaches).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """Reach (k,) of ``triangles`` through the planes of ``walls`` on the side where it is less; NaN without area."""
+    """Penetration (k,) of ``triangles`` through the planes of ``walls``, on the side with less; NaN without area."""
     across = normals(walls)
     with np.errstate(invalid="ignore", divide="ignore"):
         across = across / np.linalg.norm(across, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Arrays that are kept on disk because they take long to make: whole or not at all, and made anew where they are damaged."""
+"""Arrays kept on disk because they take long to make: written atomically, and made anew where damaged."""
 
 import logging
 import tempfile
@@ -14,7 +14,9 @@ Arrays = dict[str, Any]
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """The value that ``of_arrays`` finds in the file at ``path``; where there is none, that of ``make``, kept as ``to_arrays``."""
+    """The value that ``of_arrays`` reads from the file at ``path``; without one, the value of ``make``, stored by
+    ``to_arrays``.
+    """
     found = _read(path, of_arrays)
     if found is None:
         found = make()
@@ -23,19 +25,19 @@ def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays],
 
 
 def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
-    """The value in a file, None where there is none that can be read whole."""
+    """The value in a file, None where none can be read completely."""
     if not path.is_file():
         return None
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return of_arrays(dict(arrays))
-    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
+    except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
         log.warning("%s: damaged, made anew: %s", path, error)
         return None
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Keep arrays, also where several processes do so; where they cannot be written a warning says so."""
+    """Store arrays, safely for several processes; warn where they cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:

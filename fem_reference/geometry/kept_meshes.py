@@ -1,4 +1,4 @@
-"""Tetrahedra that were made before, on disk: gmsh takes seconds to a minute for what takes a hundredth of that to read."""
+"""Tetrahedra stored on disk: gmsh takes seconds to a minute, reading a hundredth of that."""
 
 import importlib.metadata
 from collections.abc import Callable, Mapping
@@ -17,11 +17,11 @@ _FACETS = "facets "
 
 
 def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, Floats], folder: Path | None) -> TetMesh:
-    """The tetrahedra that ``mesher`` makes of a surface, ``size`` [mm] and ``shares``, which are those of
+    """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are kept in ``folder``, where that is not None, under a hash of all that they depend on: this package and those that it
-    stands on are part of that.
+    They are stored in ``folder``, unless it is None, under a hash of all that they depend on, including this package and those
+    that it imports.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -32,7 +32,7 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
 
 @cache
 def code() -> str:
-    """A hash of all of the source here, and the versions of the packages that meshes are made with."""
+    """A hash of all source files here, and of the versions of the packages that make meshes."""
     folder = Path(__file__).parent
     sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
     versions = dict[str, str]()

@@ -1,4 +1,4 @@
-"""Lagrange functions on intervals and triangles, and Gauss rules there: what an integral over a field needs."""
+"""Lagrange functions and Gauss rules on intervals and triangles, for integrals over a field."""
 
 from collections.abc import Callable
 from functools import cache
@@ -14,8 +14,8 @@ POINTS = 5  # of the rules along each direction: exact up to degree 9
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
     """The L2 norm over a ``mesh`` of intervals or triangles, in the plane or in space, of a Lagrange function minus an ``exact``
-    one, which gives values (q,) at points (q, d). The function has ``values`` (N,) at the nodes: the vertices, then for order 2 the
-    middles of ``mesh.edges``.
+    one, which gives values (q,) at points (q, d). The function has ``values`` (N,) at the nodes: the vertices, then for order 2
+    the middles of ``mesh.edges``.
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])

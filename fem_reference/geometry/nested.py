@@ -1,4 +1,4 @@
-"""Refinement of tetrahedra each into eight: nested, graded towards rims, its boundary on the surface that is filled."""
+"""Refinement of each tetrahedron into eight: nested, graded towards rims, with the boundary moved onto the filled surface."""
 
 from dataclasses import dataclass
 
@@ -19,8 +19,8 @@ from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
 
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-# The eight parts of a tet, of its corners 0 to 3 and the points 4 to 9 on its edges in the order above, by which of the three
-# diagonals between opposite edges cuts the octahedron in the middle.
+# The eight parts of a tet with corners 0 to 3 and points 4 to 9 on its edges in the order above, for each of the three diagonals
+# between opposite edges that may cut the octahedron in the middle.
 _CORNERS = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]]
 _DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
 PARTS = np.array(
@@ -32,11 +32,11 @@ PARTS = np.array(
 )
 # A face with corners a, b, c and points on its edges (ab, ac, bc): its four parts.
 _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
-# Towards an edge of a rim, where displacement goes with the root of the distance, a cell is cut at this share: every refinement
-# then divides the error that comes from there by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
+# The position of the cut on an edge at a rim, where displacement goes with the square root of the distance. Every refinement then
+# divides the error from there by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
 # 10.1007/s00211-005-0588-3); in a smooth part quadratic elements do better.
 GRADED = 0.25
-# A point moves onto the surface as far as the tets around it keep this share of their volume and of their quality.
+# A point moves towards the surface as long as the tets around it keep this share of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
 
@@ -45,7 +45,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """The edges of a mesh: ``ends`` (e, 2), which of them each tet has, ``of_tets`` (k, 6), and a new point on each, ``points``
+    """The edges of a mesh: ``ends`` (e, 2), the edges ``of_tets`` (k, 6) of each tet, and a new point on each edge, ``points``
     (e, 3).
     """
 
@@ -58,8 +58,8 @@ def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) 
     """Tetrahedra each cut into eight, and the facets of regions into four.
 
     Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter, all others in the middle. All
-    boundary points then move onto ``surface``, and from there along their normals so that as much is enclosed, as far as
-    tetrahedra stay sound; where it is None they stay.
+    boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far as
+    tetrahedra stay valid; where it is None they stay.
     """
     cut = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, cut.points])
@@ -104,7 +104,7 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
-    """The parts (4 m, 3) of ``faces`` (m, 3), turned as they are; ``keys`` are those of the edges in order."""
+    """The parts (4 m, 3) of ``faces`` (m, 3), with the same orientation; ``keys`` are those of the edges in order."""
     if len(faces) == 0:
         return faces
     pairs = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
@@ -113,8 +113,8 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points`` with those of the boundary moved to the nearest point of the surface, and all of them on by one distance that
-    keeps its volume, or as much of that as the tets around them bear.
+    """The ``points`` with boundary points moved to the nearest point of the surface, then all by one distance that keeps its
+    volume; less where the tets around them would become invalid.
     """
     faces, _ = boundary(tets)
     outer = np.unique(faces)

@@ -1,4 +1,4 @@
-"""The part of a closed surface's inside that lies within a rigid body, looked for at random points."""
+"""The part of a closed surface's inside that lies within a bone, by random sampling."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,20 +11,20 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.pieces import edge_lengths, quartered
 from fem_reference.geometry.windings import inside
 
-# The first cubes are at most this long [mm], and one in so many of the longest extent of the surface.
+# The first cubes are at most this long [mm], and at most the longest extent of the surface over this number.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# In a box of more first cubes, a cubic metre or more, nothing is counted.
+# In a box of more first cubes, a cubic metre or more, the volume is not computed.
 _TOO_MANY = 1e6
-# Cubes are cut smaller in so many rounds, each time to at most this many; so many points at most are drawn in them.
+# The number of rounds of subdivision, the most cubes after each, and the most points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# A triangle is looked at in parts of down to an eighth of its size.
+# A triangle is sampled in parts of down to an eighth of its size.
 _PARTINGS = 3
 
 Distance = Callable[[Floats], Floats]
 
 
 class Shared(NamedTuple):
-    """The ``volume`` [mm3] within the rigid body, and how deep [mm] the ``deepest`` point drawn there is, 0 without."""
+    """The ``volume`` [mm3] within the rigid body, and the depth [mm] of the ``deepest`` sample there, 0 without."""
 
     volume: float
     deepest: float
@@ -34,13 +34,13 @@ def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
-    these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands for,
-    times the root of the number of points in cubes on the border of the overlap.
+    these, the same every time. On average the count is exact. Its standard deviation is at most half the volume of one point,
+    times the square root of the number of points in cubes on the border of the overlap.
 
-    A point counts where its nearest triangle is one of those that ``counts`` (m,) names. The rigid body is known by its
-    ``distance`` (n,) [mm] of points (n, 3) to it, negative inside, and by points ``body`` (k, 3) [mm] on all its sides: where all
-    are inside the surface, it is swallowed, and counts as a whole. Nothing is shared where no triangle that counts comes into the
-    body, nor that into the surface as far as its middle. The volume is NaN where the surface has blown up beyond a cubic metre.
+    A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
+    [mm] of points (n, 3) to it, negative inside, and by points ``body`` (k, 3) [mm] on all its sides: where all are inside the
+    surface, the whole body counts. The volume is 0 where no counted triangle enters the body, and the body does not reach into
+    the surface up to its middle. It is NaN where the surface has blown up beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
@@ -73,7 +73,7 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
-    """True where a triangle that counts comes into the body: looked for at its vertices, near the body at ever smaller parts."""
+    """True where a counted triangle enters the body; tested at its vertices, and near the body at ever smaller parts."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], distance(surface.points)[triangles]
     for _ in range(_PARTINGS):
@@ -86,14 +86,14 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) ->
 
 
 class _Sides:
-    """The triangles of a surface that count and those that do not, asked for distances."""
+    """The counted and the other triangles of a surface, for distance queries."""
 
     def __init__(self, surface: Surface, counts: NDArray[np.bool_]) -> None:
         self.surface = surface
         self.parts = [Surface(surface.points, surface.triangles[some]) for some in (counts, ~counts)]
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
-        """Mask (n,) of the balls of radius ``reach`` about ``centres`` (n, 3) that may contain something that counts."""
+        """Mask (n,) of the balls of radius ``reach`` about ``centres`` (n, 3) that may contain counted points."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)
@@ -101,14 +101,14 @@ class _Sides:
         return np.asarray(found)
 
     def count(self, points: Floats) -> NDArray[np.bool_]:
-        """Mask (n,) of the ``points`` (n, 3) that are inside and nearest to a triangle that counts."""
+        """Mask (n,) of the ``points`` (n, 3) that are inside and nearest to a counted triangle."""
         found = inside(self.surface, points)
         counting, other = self._distances(points[found])
         found[found] = counting <= other
         return found
 
     def _distances(self, points: Floats) -> list[Floats]:
-        """Distance (n,) [mm] of ``points`` (n, 3) to the triangles that count, and to the others; infinite where there are none."""
+        """Distance (n,) [mm] of ``points`` (n, 3) to the counted triangles, and to the others; infinite where there are none."""
         return [
             distances(points, part).distance if len(part.triangles) else np.full(len(points), np.inf)
             for part in self.parts

@@ -13,8 +13,8 @@ from fem_reference.geometry.distance import distances
 Bools = NDArray[np.bool_]
 
 _ROUNDS = 4  # of collapses, flips and slides
-_SHORT = 0.4  # Of an edge at a rim that is collapsed, in sizes of a triangle.
-_STRAIGHT = np.cos(np.radians(50))  # A rim that turns more at a point has a corner there.
+_SHORT = 0.4  # Length of an edge at a rim below which it is collapsed, in sizes of a triangle.
+_STRAIGHT = np.cos(np.radians(50))  # A rim with a greater angle at a point has a corner there.
 _SAME_SIDE = 0.5  # The least cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
 
@@ -22,7 +22,7 @@ _TINY = np.finfo(float).tiny
 @dataclass(frozen=True, eq=False)
 class Parts:
     """A surface whose triangles each belong to one part: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,)
-    are the points where parts meet.
+    marks the points where parts meet.
     """
 
     points: Floats

@@ -1,4 +1,4 @@
-"""Patches of triangles that landmarks on a surface span, laid on it."""
+"""Patches of triangles spanned by landmarks on a surface, and draped on it."""
 
 import igl
 import numpy as np
@@ -8,17 +8,18 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.pieces import edge_lengths
 
-# The most triangles that a patch is laid on a bone in: those of some metres.
+# The most triangles of a draped patch: those of a patch of some metres.
 _MOST_TRIANGLES = 2**20
-# Sides of the triangles of a patch that is laid on a bone are at most this long [mm].
+# The longest side [mm] of the triangles of a draped patch.
 _SIDE = 2.0
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
-    """The patches laid on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the bone.
+    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the
+    bone.
 
-    Landmarks lie on the bone, but what they span over a hollow does not: over the iliac fossa it is 13 mm off, more than the muscle
-    is thick there.
+    Landmarks lie on the bone, but the triangles between them do not in a hollow: over the iliac fossa they are 13 mm off, more
+    than the thickness of the muscle there.
     """
     points, triangles = patches.points, patches.triangles
     longest = _longest_side(points, triangles)
@@ -31,13 +32,13 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     return Surface(distances(points, bone_surface).closest, triangles, patches.place)
 
 
-@np.errstate(over="ignore")  # squares of a point that is that far away: it is infinitely far
+@np.errstate(over="ignore")  # squares overflow for a point that is infinitely far away
 def _longest_side(points: Floats, triangles: Ints) -> float:
     return float(edge_lengths(points[triangles]).max())
 
 
 def fan(points: Floats) -> Surface:
-    """Triangles from the centroid of ``points`` (n, 3) to each two that are next in angle in their best-fit plane."""
+    """Triangles from the centroid of ``points`` (n, 3) to each two successive ones by angle in their best-fit plane."""
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)
     x, y, _ = axes @ (points - centre).T

@@ -1,4 +1,4 @@
-"""Penetration of a closed body and a bone, wherever their surfaces cross or one is within the other."""
+"""Penetration of a closed body and a bone, where their surfaces cross or one is within the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
 
-# Points of a triangle that are looked at where it crosses another surface: those of a grid of quarters, its corners among them.
+# Sample points of a triangle that crosses another surface: those of a grid of quarters, its corners among them.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedSurface:
-    """A closed ``surface`` that knows the depths of points in it."""
+    """A closed ``surface`` with the depths of points in it."""
 
     surface: Surface
 
@@ -43,22 +43,22 @@ class ClosedSurface:
 
 @dataclass(frozen=True, eq=False)
 class Depths:
-    """Depths [mm] in each other of the vertices and the triangles of a body and then those of a bone, 0 outside, and the
-    ``places`` [mm] where; of triangles only those that cross the other surface are looked at, where they are deepest.
+    """Penetration depths [mm] of the vertices and triangles of a body and then those of a bone, 0 outside, and their ``places``
+    [mm]; only triangles that cross the other surface are sampled, where they are deepest.
     """
 
     values: Floats
     places: Floats
 
     def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
-        """The greatest depth [mm] beyond that at ``rest``, and where (3,) [mm]."""
+        """The greatest depth [mm] beyond that at ``rest``, and its place (3,) [mm]."""
         beyond = self.values if rest is None else np.maximum(self.values - rest.values, 0.0)
         worst = int(np.argmax(beyond))
         return float(beyond[worst]), self.places[worst]
 
 
 def depths(body: ClosedSurface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
-    """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4), whose ``shape`` knows the distance to it.
+    """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4); ``shape`` gives the distance to the bone.
 
     Depth in the bone is as exact as its distance field, depth in the body exact.
     """
@@ -77,8 +77,8 @@ def depths(body: ClosedSurface, bone: Surface, shape: Obstacle, pose: Floats) ->
 
 
 def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats]) -> list[tuple[Floats, Floats]]:
-    """The ``depth`` of the vertices and of the triangles of a surface, and where: of the triangles ``crossing`` another surface
-    where they are deepest, and of the vertices that it reaches from their corners inside, or from one of each of its parts.
+    """The ``depth`` of the vertices and triangles of a surface, and their places: of triangles ``crossing`` another surface where
+    they are deepest, and of vertices reached from their inside corners, or from one in each of its parts.
     """
     triangles, points = surface.triangles, surface.points
     inside = np.zeros(len(points), bool)
@@ -98,6 +98,8 @@ def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floa
 
 @lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
-    """A vertex of each part of a surface of ``triangles``, 64 bit integers: a part that crosses nothing is where this is."""
+    """A vertex of each part of a surface of ``triangles``, 64 bit integers: without a crossing, its side is that of the whole
+    part.
+    """
     parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
     return np.unique(parts, return_index=True)[1]

@@ -1,4 +1,4 @@
-"""Triangles of a surface cut small: places on it that are everywhere about as dense, however large its triangles are."""
+"""Triangles of a surface cut into small pieces: sample places of about equal density, independent of the triangles' size."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_areas
 
-# Thin is a triangle the square of whose longest edge is more than so many times its area: of half a square it is 4 times that.
+# A triangle is thin if the square of its longest edge is more than so many times its area: for half a square the ratio is 4.
 _THIN = 5.0
 # A triangle cut in four: the barycentric coordinates (3, 3) of the corners of each part.
 _QUARTERS = np.array(
@@ -22,8 +22,8 @@ _QUARTERS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Pieces of the triangles of a surface: the ``parents`` (k,), the triangle that each is cut from, and the barycentric
-    coordinates in it of the ``corners`` (k, 3, 3) of the piece.
+    """Pieces of the triangles of a surface: the ``parents`` (k,), the triangle of each piece, and the barycentric coordinates in
+    it of the ``corners`` (k, 3, 3) of the piece.
     """
 
     parents: Ints
@@ -42,7 +42,9 @@ class Pieces:
         return Pieces(np.concatenate(parents), np.concatenate(corners))
 
     def of(self, values: Floats) -> Floats:
-        """A field linear in triangles, with ``values`` (m, 3, d) at their corners, at the corners of the pieces (k, 3, d)."""
+        """The values at the corners of the pieces (k, 3, d) of a field linear in triangles, with ``values`` (m, 3, d) at
+        theirs.
+        """
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":
@@ -50,7 +52,7 @@ class Pieces:
         return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
-        """Each cut in two in the middle of the longest of its edges of ``lengths`` (k, 3), the first of which leaves corner 0."""
+        """Each cut in two at the middle of its longest edge of ``lengths`` (k, 3), the first of which leaves corner 0."""
         order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
         halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]
@@ -63,13 +65,13 @@ def quartered(corners: Floats) -> Floats:
 
 
 def edge_lengths(corners: Floats) -> Floats:
-    """Lengths of edges of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner (k, 3) [mm]."""
+    """Edge lengths (k, 3) [mm] of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner."""
     return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
 
 
 def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:
-    """The ``triangles`` (k,) of a ``surface`` in pieces, the edges of each of which are on average at most ``apart`` [mm] long: the
-    large ones in four, or in two where they are thin.
+    """The ``triangles`` (k,) of a ``surface`` in pieces whose edges are on average at most ``apart`` [mm] long: large ones are
+    cut in four, or in two where they are thin.
     """
     corners, pieces = surface.points[surface.triangles], Pieces.whole(triangles)
     while (large := (lengths := edge_lengths(pieces.of(corners))).mean(axis=1) > apart).any():

@@ -1,8 +1,8 @@
-"""Signed distance to rigid bodies of closed form, and the protocol that all obstacles meet.
+"""Signed distance to bones of closed form, and the protocol of all obstacles.
 
-Each body answers in its own rest frame. Distances are negative inside; gradients are unit vectors that point away from the
-nearest part of the surface, curvatures the second derivatives. On ridges, where two parts are equally near, one of them
-is taken; a curvature that would be infinite (on a sharp edge, at a centre, on an axis) is zero.
+Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors away from the nearest part of the
+surface, curvatures the second derivatives. On ridges, where two parts are equally near, one of them is taken; an infinite
+curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body that knows how far away it is; that distance changes by at most ``steepest`` times how far one goes."""
+    """A rigid body with a signed distance, which changes by at most ``steepest`` times the length of a path."""
 
     @property
     def steepest(self) -> float:
@@ -40,7 +40,7 @@ class Obstacle(Protocol):
         ...
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm] of the way from points (n, 3) to where the distance is at most ``within`` [mm]."""
+        """A lower bound (n,) [mm] of the path from points (n, 3) to where the distance is at most ``within`` [mm]."""
         ...
 
     def sample(self, points: Floats) -> Sampled:
@@ -49,18 +49,18 @@ class Obstacle(Protocol):
 
 
 class Exact:
-    """Base of bodies of closed form: their distance is exact, everywhere."""
+    """Base of bodies of closed form: their distance is exact everywhere."""
 
     steepest: ClassVar[float] = 1.0
 
     def clearance(self: Obstacle, within: float) -> Callable[[Floats], Floats]:
-        """The distance of points less ``within`` [mm]."""
+        """The distance of points minus ``within`` [mm]."""
         return lambda points: self.sample(points).distance - within
 
 
 @dataclass(frozen=True)
 class HalfSpace(Exact):
-    """All that lies behind the plane through ``point`` [mm] across ``normal``, of any length, which points out of it."""
+    """The half-space behind the plane through ``point`` [mm] across the outward ``normal``, of any length."""
 
     point: Vector
     normal: Vector
@@ -71,7 +71,7 @@ class HalfSpace(Exact):
 
     @property
     def half_thickness(self) -> float:
-        """None: it goes on for ever."""
+        """Infinite."""
         return np.inf
 
     def sample(self, points: Floats) -> Sampled:
@@ -103,7 +103,7 @@ class Sphere(Exact):
 
 @dataclass(frozen=True)
 class Capsule(Exact):
-    """All that is within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
+    """The points within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
 
     start: Vector
     end: Vector
@@ -119,7 +119,7 @@ class Capsule(Exact):
         return self.radius
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to the segment, less the radius."""
+        """The distance to the segment, minus the radius."""
         axis, extent = _axis(self.start, self.end)
         along = (points - self.start) @ axis
         length, away, squares = _length(points - self.start - np.clip(along, 0, extent)[:, None] * axis)
@@ -148,7 +148,7 @@ class Box(Exact):
         return min(self.size) / 2
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to a box smaller by the rounding on each side, less the rounding."""
+        """The distance to a box smaller by the rounding on each side, minus the rounding."""
         away = points - self.centre
         sign = np.where(away < 0, -1.0, 1.0)
         beyond = np.abs(away) - (np.asarray(self.size) / 2 - self.rounding)
@@ -189,7 +189,7 @@ class Cylinder(Exact):
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
 
 
-# By the names that case files give them.
+# By their names in case files.
 CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
     "half_space": HalfSpace,
     "box": Box,

@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: the triangles end where the attachment ends."""
+"""Rims of attachments as edges of a coarse surface: its triangles end at the rim."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,32 +16,32 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 Bools = NDArray[np.bool_]
 
-# Chosen on the report's muscles and our own hip. In sizes of a triangle: how far the shares are smoothed. More rounds off corners.
+# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle. More rounds off corners.
 _SMOOTHED = 0.1
 # A vertex nearer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers stay.
 _NEAR = 0.3
-# Nearer than this a vertex that must not move counts as on the rim where it is.
+# A fixed vertex nearer than this counts as on the rim.
 _THERE = 0.2
-# Over a piece of an attachment, or a gap in it, wider than this share of it an edge is cut.
+# An edge over a piece of an attachment, or a gap in it, is cut where these are wider than this share of it.
 _NARROW = 0.3
-_REFINED = 2  # times that narrow pieces and gaps are looked for
-_ISLAND = 0.1  # squares of the size: the area from which an island of an attachment is kept
-_WIDENED = 0.1  # sizes of a triangle by which a rim moves outwards at most, in each of a few rounds
+_REFINED = 2  # rounds of search for narrow pieces and gaps
+_ISLAND = 0.1  # squares of the size: the least area of an island of an attachment that is kept
+_WIDENED = 0.1  # sizes of a triangle: the most that a rim moves outwards in each of a few rounds
 _SAMPLES = 17  # of the shares along an edge
-_TRIALS = 10  # of the level whose area is nearest
+_TRIALS = 10  # of the level, to match the area
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
     """A coarse surface with edges along the rims of attachments.
 
     The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level of them that
-    encloses the area they have. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
+    encloses their original area. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
     doi 10.1145/1276377.1276448, for surfaces).
 
     Parameters
     ----------
     coarse, fine
-        The surface to cut, and the one that attachments are defined on.
+            The surface to cut, and the one on which attachments are defined.
     shares
         By attachment, the attached shares (k, 3) of the corners of the triangles of ``fine``.
     size
@@ -50,7 +50,7 @@ def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size
     Returns
     -------
     surface, labels
-        Of its m triangles the labels (m,): 0 free, i + 1 attached by attachment i.
+            Labels (m,) of its m triangles: 0 free, i + 1 attached by attachment i.
 
     """
     parts = Parts(
@@ -91,7 +91,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """The parts with a point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
+    """The parts with a new point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
     number = _islands(fine, shares)
     attached = number >= 0
     sizes = np.bincount(
@@ -114,7 +114,7 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
-    """The number (m, 3) of the connected island of shares above a half that each corner is in, -1 outside all."""
+    """The number (m, 3) of each corner's connected island of shares above a half, -1 outside all."""
     attached = np.zeros(len(fine.points), bool)
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -124,7 +124,7 @@ def _islands(fine: Surface, shares: Floats) -> Ints:
 
 
 def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
-    """The parts with the rim at the level whose area comes nearest to ``area`` [mm2], by bisection."""
+    """The parts with the rim at the level with the area nearest to ``area`` [mm2], by bisection."""
     for _ in range(_REFINED):
         parts = _refined(parts, fine, _Edges.of(parts, fine, shares))
     edges = _Edges.of(parts, fine, shares)
@@ -140,8 +140,8 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts with edges cut that pass over a narrow piece of an attachment or a gap in it: where, in between, they are on the
-    other side of the level of a half for a good part of their length.
+    """The parts with edges cut that pass over a narrow piece of an attachment or a gap in it: edges that, in between, are on the
+    other side of the level of a half for much of their length.
     """
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
@@ -192,8 +192,8 @@ class _Edges:
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """The places at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not;
-    ``signs`` (n,) of the points, and whether the middles of triangles are ``within`` (m,).
+    """The places at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN without a
+    crossing; ``signs`` (n,) of the points, and the mask ``within`` (m,) of the middles of triangles.
     """
 
     edges: _Edges
@@ -203,7 +203,7 @@ class _Crossings:
 
 
 def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
-    """The parts with triangles cut along the crossings; those inside that were free get the ``label``."""
+    """The parts with triangles cut along the crossings; formerly free ones inside get the ``label``."""
     points, signs = _snapped(parts, fine, crossings)
     ends = crossings.edges.ends
     split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
@@ -219,9 +219,7 @@ def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Part
 
 
 def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats, Ints]:
-    """Points (n, 3) after those near a crossing moved there, unless that leaves a sharp edge or another rim; signs (n,), 0 on the
-    rim.
-    """
+    """Points (n, 3), moved to near crossings unless they would leave a sharp edge or another rim; signs (n,), 0 on the rim."""
     across = ~np.isnan(crossings.fractions[:, 0])
     ends, fractions = crossings.edges.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])
@@ -244,7 +242,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
     """Points and triangles after the ``chosen`` edges (k,) are cut at points of ``fine`` nearest to ``middles`` (k, 3), and the
-    triangle that each is part of.
+    original triangle of each.
     """
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
@@ -253,8 +251,8 @@ def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Fl
 
 
 def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
-    """Triangles cut at the points ``cuts`` (m, 3) on the edges opposite to their corners, -1 for none; and the
-    triangle that each is part of.
+    """Triangles cut at the points ``cuts`` (m, 3) on the edges opposite to their corners, -1 for none; and the original triangle
+    of each.
     """
     count = (cuts >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]

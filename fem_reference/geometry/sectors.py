@@ -1,16 +1,16 @@
-"""Smooth sectors around the vertices of a surface, and the shares to which triangles are attached."""
+"""Smooth sectors around the vertices of a surface, and the attached shares of triangles."""
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
 
-# Two triangles meet in a sharp edge where their normals are more than this apart.
+# Two triangles meet in a sharp edge where the angle between their normals is greater.
 _SHARP = np.cos(np.radians(45))
 
 
 def sectors(surface: Surface) -> Ints:
-    """The number (m, 3) of the sector that each corner of a triangle is in: around a vertex, from sharp edge to sharp edge."""
+    """The number (m, 3) of the sector of each corner of a triangle: around a vertex, from sharp edge to sharp edge."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
     sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # side 3 t + i leaves corner i of triangle t
@@ -26,10 +26,10 @@ def sectors(surface: Surface) -> Ints:
 
 
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
-    """The share, 1 or 0, to which each corner (m, 3) of the triangles of ``surface`` is attached by attached ``vertices`` (k,).
+    """The attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for attached ``vertices`` (k,).
 
-    A vertex on a sharp edge attaches only the sides of the edge on which it attaches a whole triangle, if there is one: the end
-    of a muscle, and not a strip of the belly around it that has no width of its own.
+    A vertex on a sharp edge attaches only those sides of the edge on which it attaches a whole triangle, if there is one: the end
+    of a muscle, but not a strip of arbitrary width of the belly around it.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True
@@ -44,7 +44,7 @@ def attached_shares(surface: Surface, vertices: Ints) -> Floats:
 
 
 def attached_area(surface: Surface, shares: Floats) -> float:
-    """The area [mm2] that the ``shares`` (m, 3) of the corners attach of ``surface``."""
+    """The attached area [mm2] of ``surface``, by the ``shares`` (m, 3) of the corners."""
     return float(triangle_areas(surface.points, surface.triangles) @ shares.mean(axis=1))
 
 

@@ -1,6 +1,6 @@
-"""Signed distance to a body of many triangles: sampled once on a regular grid, then twice differentiable everywhere.
+"""Signed distance to a body of many triangles: sampled once on a regular grid, and twice differentiable everywhere.
 
-Between the nodes stand tricubic B-splines, so that gradient and curvature are continuous: what Newton needs of contact.
+Tricubic B-splines interpolate between the nodes, so that gradient and curvature are continuous, as Newton needs for contact.
 """
 
 import logging
@@ -29,17 +29,17 @@ from fem_reference.geometry.kept_arrays import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 from fem_reference.geometry.windings import inside
 
-# The distance [mm] to what lies outside a grid: far away from everything, and yet a number to calculate with.
+# The distance [mm] outside a grid: far away from everything, but finite.
 FAR = 1e6
-# A grid of more nodes is not built to reach an error: 256 cubed, 134 MB.
+# The most nodes of a grid that is refined for an error: 256 cubed, 134 MB.
 MOST_NODES = 2**24
 # The first grid of ``resolve`` has about this many cells along its longest edge.
 _FIRST_CELLS = 24
-# Beyond the margin the distance is exact for this many cells more: a spline forgets 73 % of a fault with each cell.
+# The distance is exact for this many cells beyond the margin: the influence of an error falls by 73 % per cell of a spline.
 _FORGETTING = 4
-# Of every so many nodes along an axis one is exact everywhere; the others only near the surface.
+# One of so many nodes along an axis is exact everywhere; the others only near the surface.
 _STRIDE = 4
-# Random points around the surface at which the error is looked for, and points in one call of libigl.
+# Random points around the surface at which the error is sampled, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
 # Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
@@ -52,11 +52,11 @@ logger = logging.getLogger(__name__)
 class Grid:
     """An obstacle whose signed distance is a tricubic spline.
 
-    ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. Within
-    ``margin`` [mm] of the surface the distance is meant; farther away it is coarser, and ``FAR`` where the grid ends.
-    ``error`` [mm] is the largest difference from the exact distance that was found within one spacing of the surface, and
-    ``mean_error`` [mm] the root of the mean square there. Farther away, ridges between two near parts are blunted as edges
-    are: by a third of a spacing. The gradient is that of the spline: a unit vector but for a few percent, more on edges.
+    ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
+    is valid within ``margin`` [mm] of the surface; farther away it is coarser, and ``FAR`` outside the grid.
+    ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
+    ``mean_error`` [mm] the root mean square there. Farther away, ridges between two near parts are blunted as edges are: by a
+    third of a spacing. The gradient is that of the spline: a unit vector up to a few percent, more on edges.
     """
 
     coefficients: Floats
@@ -71,20 +71,20 @@ class Grid:
 
     @cached_property
     def steepest(self) -> float:
-        """A bound of the length of the gradient: a spline is along each axis no steeper than its coefficients."""
+        """A bound of the length of the gradient: along each axis a spline is no steeper than its coefficients."""
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound of the depth [mm] of its deepest place: a spline is nowhere below its coefficients; infinite where nodes are too
-        far apart to know it.
+        """A bound of the depth [mm] of its deepest place: a spline is nowhere below its coefficients; infinite where nodes are
+        too far apart for a bound.
         """
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound of the way from points to where the distance is at most ``within`` [mm]."""
+        """A lower bound of the path from points to where the distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
@@ -99,7 +99,7 @@ class Grid:
         return found
 
     def _interpolate(self, at: Floats) -> Sampled:
-        """At places (n, 3) inside the grid, counted in cells from its origin."""
+        """The values at places (n, 3) inside the grid, in cells from its origin."""
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
         x, y, z = (_weights(at[:, axis] - cell[:, axis]) for axis in range(3))
@@ -125,11 +125,12 @@ def _weights(within: Floats) -> Floats:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and meant within ``margin``
-    [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as ``check_closed`` says.
+    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within
+    ``margin`` [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in
+    ``check_closed``.
 
-    ``rounding`` is the standard deviation s [mm] of the Gaussian mean that is taken of the distance, as flat triangles are no
-    smooth body to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
+    ``rounding`` is the standard deviation s [mm] of a Gaussian mean of the distance, as contact does not slide smoothly along
+    flat triangles; where the surface has a mean curvature of 1/r, it moves inward by s^2/r. It counts as error.
     """
     surface = _oriented(surface)
     low, shape = _extent(surface, spacing, margin)
@@ -142,11 +143,11 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm], or ``MOST_NODES``
-    forbids more; its own says what it reached.
+    """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
+    reached; its own ``mean_error`` is the result.
 
-    The largest error is no such measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to the
-    spacing, and in a slit narrower than a cell not at all.
+    The largest error is no suitable measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to
+    the spacing, and in a slit narrower than a cell not at all.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -160,8 +161,8 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` with the spacing of :func:`resolve`, kept in ``folder`` under a hash of all that it depends on,
-    this file among it.
+    """The grid of :func:`build` with the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that it depends on,
+    including this file.
     """
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
@@ -211,16 +212,16 @@ def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: fl
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
     stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
     values: Floats = zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
-    # Trilinear values are wrong by at most half the diagonal of a coarse cell: distance changes no faster than its place.
+    # The error of trilinear values is at most half the diagonal of a coarse cell: a distance changes no faster than its point.
     near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
     values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
     return values
 
 
 def _coefficients(values: Floats) -> Floats:
-    """Those of the B-splines through ``values`` (i, j, k), with one more on each side.
+    """The coefficients of the B-splines through ``values`` (i, j, k), with one more on each side.
 
-    The values continue beyond the border by reflection in their border value, which leaves them no bend there.
+    The values continue beyond the border by reflection in their border value, which leaves no bend there.
     """
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
@@ -239,7 +240,7 @@ def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
 
 
 def _on(surface: Surface) -> Floats:
-    """All vertices, all middles of edges and triangles, and random points of edges, longer ones oftener: (n, 3) [mm]."""
+    """All vertices, all middles of edges and triangles, and random points of edges, more on longer ones: (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -1,4 +1,4 @@
-"""Material points on the surface of a body of tetrahedra, each with its area: where contact presses and springs pull."""
+"""Material points on the surface of a tetrahedral body, each with its area: for contact pressure and springs."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,14 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.pieces import Pieces, edge_lengths
 
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# Points on a surface are so many to its diagonal, or more: on muscles of the hip, 3 mm apart.
+# The least number of points along the diagonal of a surface: on muscles of the hip, 3 mm apart.
 _ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points of a surface that the cells follow only roughly: the straight ``cells`` (n,) they move with, ``points``
-    (n, 3) [mm] where they are at rest, somewhat outside their cell perhaps, and the rest ``areas`` (n,) [mm2] that each stands for.
+    """Material points of a surface that the cells follow only roughly: the straight ``cells`` (n,) that carry them, their rest
+    positions ``points`` (n, 3) [mm], perhaps somewhat outside their cell, and their rest ``areas`` (n,) [mm2].
     """
 
     cells: Ints
@@ -25,14 +25,14 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """The distance [mm] of points on a ``surface``, on average and at most: the same whatever it is filled with."""
+    """The greatest average distance [mm] of points on a ``surface``, independent of its mesh."""
     return diagonal(surface.points) / _ACROSS
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of the attached part of a ``surface`` of m triangles, on average at most ``apart`` [mm] from each other,
-    carried by the tetrahedra of a ``mesh``. The areas of points are those attached by the ``shares`` (m, 3) of corners, linear
-    between them.
+    """The material points of the attached part of a ``surface`` of m triangles, on average at most ``apart`` [mm] from each
+    other, carried by the tetrahedra of a ``mesh``. Their areas are weighted by the attached ``shares`` (m, 3) of corners, linear
+    in between.
     """
     pieces, corners = Pieces.whole(np.flatnonzero(shares.any(axis=1))), surface.points[surface.triangles]
     while len(pieces.parents) and edge_lengths(pieces.of(corners)).mean() > apart:
@@ -41,13 +41,14 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Three points (3 k, 3) [mm] inside each triangle of ``corners`` (k, 3, 3), a rule that is exact for squares and has none on
-    sharp edges, where two faces would be in contact at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
+    """Three points (3 k, 3) [mm] inside each triangle of ``corners`` (k, 3, 3), a rule that is exact for squares and has no
+    points on sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares``
+    (k, 3).
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas
 
 
 def embedded(places: Floats, areas: Floats, mesh: TetMesh) -> Skin:
-    """The skin of ``places`` (n, 3) [mm] and ``areas`` (n,) [mm2] that a ``mesh`` carries."""
+    """The skin of ``places`` (n, 3) [mm] and ``areas`` (n,) [mm2], carried by a ``mesh``."""
     return Skin(Locator(mesh).embed(places).tets, places, areas)

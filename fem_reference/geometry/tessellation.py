@@ -1,6 +1,6 @@
-"""Closed triangle surfaces of rigid bodies of closed form: for pictures, and for what asks a bone for its surface.
+"""Closed triangle surfaces of bones of closed form, for pictures and for code that needs a bone's surface.
 
-Their vertices lie on the body. A ball, a capsule and a box are all one: the corner parts of a sphere, moved apart.
+Their vertices lie on the body. A ball, a capsule and a box are built alike: from the corner parts of a sphere, moved apart.
 """
 
 import numpy as np
@@ -11,15 +11,15 @@ from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpac
 
 # Sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
 TURN = 64
-# Of a half-space, how far its square reaches from the middle of what is beside it, and how thick it is, over the size of that.
+# For a half-space, the half side of its square from the middle of nearby points, and its thickness, over the size of these.
 _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of closed form, in ``turn`` sides to a full turn; errors in it name ``place``.
+    """The closed outward surface of a body of closed form, with ``turn`` sides to a full turn; its errors name ``place``.
 
-    A half-space reaches past the points ``beside`` (n, 3) [mm]: having no end, it is a slab, of whose vertices only those in the
-    plane lie on the body.
+    A half-space extends past the points ``beside`` (n, 3) [mm]: as it is infinite, it becomes a slab, of whose vertices only
+    those in the plane lie on the body.
     """
     match solid:
         case HalfSpace():
@@ -43,7 +43,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
 
 
 def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
-    """A square in the plane under the middle of ``beside``, and as much of what is behind it."""
+    """A square in the plane under the middle of ``beside``, with a slab behind it."""
     middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
     size = diagonal(beside)
     frame = _frame(np.asarray(half_space.normal, float))
@@ -63,8 +63,8 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
-    """Along an axis, the corners about -``half`` and ``half``, each in ``count`` steps of equal angles from the middle of a face to
-    the edge of a cube: the tangents of the angles, and which centre each belongs to. Two corners about one centre share a middle.
+    """Along an axis, the corners about -``half`` and ``half``, each in ``count`` steps of equal angles from the middle of a face
+    to the edge of a cube: the tangents of the angles, and the centre of each. Two corners about one centre share a middle.
     """
     if rounding == 0:
         return np.array([-1.0, 1.0]), np.array([-half, half])

@@ -1,7 +1,7 @@
-"""Filling a closed surface with tetrahedra made for quality: the mesh does not keep the vertices of a finer surface.
+"""Filling of a closed surface with tetrahedra of high quality: the mesh does not keep the vertices of a finer surface.
 
-``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a process of its own, where it may
-crash, hang or keep its global state.
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a subprocess, where it may crash, hang or
+keep its global state.
 """
 
 import logging
@@ -36,25 +36,26 @@ log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
-_VOLUME_WITHIN = 0.05  # a surface that passes through itself has no volume to compare with more closely
+_VOLUME_WITHIN = 0.05  # no closer, as the volume of a surface that passes through itself is not well defined
 _MOST_TETS = 3e6  # some GB and minutes, far above what a solver takes
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
-_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the number of triangles wanted, tried in turn
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
     """Fill a closed surface with tetrahedra.
 
     A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that
-    does not pass through itself and keeps its triangles. The mesh moves with the surface: it is made in a frame that the surface's
-    own vertices span. Where gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time (its issue 72).
+    does not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it
+    moves with the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue
+    72).
 
     Parameters
     ----------
     surface
         Closed and outward, of m triangles.
     size
-        The edge length wanted [mm].
+            The requested edge length [mm].
     shares
         By attachment, the attached shares (m, 3) of the corners of triangles.
 
@@ -80,9 +81,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 
 
 def check_size(surface: Surface, size: float) -> None:
-    """InputError where it takes more than ``_MOST_TETS`` regular tets to fill a surface, or ``size`` is above its smallest extent.
+    """Raise InputError where more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` is above its smallest extent.
 
-    In the frame that its vertices span, so that turning the surface changes nothing.
+    The extent is that in the frame of its vertices, so that turning the surface changes nothing.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
@@ -94,7 +95,7 @@ def check_size(surface: Surface, size: float) -> None:
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
-    """Origin (3,) and axes in columns (3, 3) that the points themselves span.
+    """Origin (3,) and axes in columns (3, 3) of the frame that the points span.
 
     From point 0 to the point farthest from it, and from that line to the point farthest from it; the lowest index where
     several are equally far.
@@ -130,7 +131,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
 
 
 def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
-    """The triangles of ``coarse`` with each label, by name; nothing where it has no rims or the mesh does not begin with its
+    """The triangles of ``coarse`` with each label, by name; empty where it has no rims or the mesh does not begin with its
     points.
     """
     count = len(coarse.points)
@@ -140,10 +141,10 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with as many triangles as equilateral ones of side ``size`` cover it, or as it is where it has less, with edges
-    along the rims of attachments; and the labels of its triangles, 0 where free.
+    """The surface with as many triangles as equilateral ones of side ``size`` cover it, or unchanged where it has fewer, with
+    edges along the rims of attachments; and the labels of its triangles, 0 where free.
 
-    Where that surface passes through itself, one of a few other counts may give one that does not, or one without rims.
+    Where the coarse surface passes through itself, one of a few other counts may give one that does not, or one without rims.
     """
     count = triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4)
     fine = count >= len(surface.triangles)
@@ -163,7 +164,7 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
 
 
 def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
-    """The coarse surface; InputError where it leaves out a part of the ``surface``."""
+    """The coarse surface; InputError where it omits a part of the ``surface``."""
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
@@ -173,7 +174,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 
 def run(mesher: str, surface: Surface, size: float) -> TetMesh:
-    """The tetrahedra that ``mesher`` makes of ``surface`` in its own process; InputError where it crashes or takes too long."""
+    """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError where it crashes or takes too long."""
     with scratch.folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
@@ -200,7 +201,7 @@ def run(mesher: str, surface: Surface, size: float) -> TetMesh:
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:
-    """The reason why a process failed: the signal that ended it, or the last line that it wrote."""
+    """The reason why a process failed: the signal that ended it, or its last line of output."""
     if done.returncode < 0:
         return f"it crashed with signal {-done.returncode}"
     return (done.stderr.strip().splitlines() or ["without a word"])[-1]
@@ -227,7 +228,7 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
 
 
 def _largest_part(tets: Ints, place: str) -> Ints:
-    """The tets of the part, connected by triangles, that has most of them."""
+    """The tets of the largest part connected by triangles."""
     faces = np.sort(tets[:, TET_FACES].reshape(-1, 3), axis=1)
     _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
     if sides.max() > 2:

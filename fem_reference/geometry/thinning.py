@@ -4,16 +4,16 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, normals, triangle_areas
 
-# Directions along which planes leave a vertex free have less than this share of the greatest eigenvalue of their quadric.
+# Directions in which planes leave a vertex free have less than this share of the greatest eigenvalue of their quadric.
 _FREE = 1e-2
 _COARSER = 1.08
 
 
 def thin(surface: Surface, count: int) -> Surface:
-    """At most ``count`` triangles in the place of ``surface``, itself where it has no more.
+    """At most ``count`` triangles in place of ``surface``, itself where it has no more.
 
-    The vertices in a cell of a grid become one, where the planes of the triangles around them are nearest (Lindstrom 2000,
-    doi 10.1145/344779.344912). What is thinner than a cell may close up: this is to be looked at, not to be computed with.
+    The vertices in a cell of a grid become one, at the point nearest to the planes of the triangles around them (Lindstrom 2000,
+    doi 10.1145/344779.344912). Parts thinner than a cell may close up: the result is for pictures, not for computation.
     """
     if len(surface.triangles) <= count:
         return surface

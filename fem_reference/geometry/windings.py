@@ -1,4 +1,4 @@
-"""Winding numbers of closed surfaces: of points, and just outside each triangle (sound, inside another part, or inside out)."""
+"""Winding numbers of closed surfaces: of points, and just outside each triangle (valid, inside another part, or inside out)."""
 
 import igl
 import numpy as np
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Surface, diagonal, normals
 
-# How far outside a triangle is looked, as a share of the surface's diagonal.
+# The distance of the sample point outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
 
 
@@ -19,12 +19,12 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The number of times (m,) that the surface winds round a place just outside each triangle: 0 on the skin of a sound body,
-    above 0 inside another part of the body, below 0 where the triangle faces a part that is inside out; NaN where a triangle has no
+    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive
+    inside another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no
     normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
-    2018, doi 10.1145/3197517.3201337, a few thousandths from the whole numbers they are rounded to.
+    2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
     """
     points, triangles = surface.points - surface.points.mean(axis=0), surface.triangles
     corners = points[triangles]

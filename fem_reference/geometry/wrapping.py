@@ -1,7 +1,7 @@
-"""The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, along it, straight.
+"""The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, geodesic, straight.
 
-Where a path touches, it goes along a geodesic: a great circle of the sphere, a helix of the cylinder. Seen along the axis
-about which it turns, both are an arc of a circle between two tangents, so one closed form serves both (the "obstacles" of
+Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of its
+rotation, both are an arc of a circle between two tangents, so one closed form serves both (the "obstacles" of
 Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
 """
 
@@ -17,10 +17,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Paths, n of them: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface, all before it where straight.
+    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface; a straight path is all before it.
 
-    ``starts``, ``ends``, and ``touches``, where each meets the surface and where it leaves it: (n, 3) [mm]. Along it a path
-    turns by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
+    ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along it a path turns
+    by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
     """
 
     parts: Floats
@@ -63,11 +63,11 @@ class WrappingSurface(Protocol):
     """A surface that paths go around."""
 
     def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) [mm] inside the surface; below 0 outside."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] inside the surface; negative outside."""
         ...
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]; one inside counts as on the surface."""
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]; points inside count as on the surface."""
         ...
 
 
@@ -92,14 +92,14 @@ class WrappingSphere:
 
 @dataclass(frozen=True)
 class WrappingCylinder:
-    """All within ``radius`` [mm] of the endless line through ``point`` [mm] along ``axis``, of any length."""
+    """The infinite cylinder of ``radius`` [mm] about the line through ``point`` [mm] along ``axis``, of any length."""
 
     point: Vector
     axis: Vector
     radius: float
 
     def depths(self, points: Floats) -> Floats:
-        """``radius`` less the distance from the axis."""
+        """``radius`` minus the distance from the axis."""
         return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
@@ -123,9 +123,9 @@ def straight(starts: Floats, ends: Floats) -> Paths:
 def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: float) -> Paths:
     """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
-    Seen along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
-    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not above 0. The displacement
-    along the axis is spread evenly over the length so seen: unrolled, the path is a straight line.
+    In a view along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
+    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not positive. The
+    displacement along the axis is distributed evenly over that length: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)

@@ -1,1 +1,1 @@
-"""Scenes as arrays and equations that a solver takes: muscles, scalar fields, bodies of any shape. No solver is known here."""
+"""Scenes as arrays and equations for solvers: muscles, scalar fields, bodies of any shape. Independent of any solver."""

@@ -1,4 +1,4 @@
-"""The attached part of a muscle: vertices of its surface, and boundary triangles of its tetrahedra below."""
+"""The attached part of a muscle: vertices of its surface, and boundary triangles of the tetrahedra below them."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ from fem_reference.geometry.sectors import shares_at
 from fem_reference.io import files
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
-# Where a triangle is sampled: its middle, near its corners, near the middles of its sides.
+# Sample points of a triangle: its middle, near its corners, near the middles of its sides.
 _SAMPLES = np.array(
     [
         [1 / 3, 1 / 3, 1 / 3],
@@ -48,7 +48,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
     Raises
     ------
     InputError
-        Names the key of the case, or the file and row (comment lines not counted), that is not usable.
+            Names the unusable key of the case, or the file and row (comment lines not counted).
 
     """
     attachment = case.attachment[i]
@@ -66,7 +66,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The facets of a mesh that lie under the attached part of a surface whose rim they do not follow.
+    """The facets of a mesh that lie under the attached part of a surface, although they do not follow its rim.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
 
 
 def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
-    """The vertices of a file of ``vertex[,value]`` rows, of which there are ``count`` on the surface."""
+    """The vertices in a file of ``vertex[,value]`` rows; the surface has ``count`` of them."""
     vertices = []
     for number, row in enumerate(files.read_rows(path), start=1):
         if number == 1 and _is_header(row[0]):
@@ -108,12 +108,12 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
 
 
 def _is_header(cell: str) -> bool:
-    """True where the first cell of a list is a word: it has a letter, and does not begin as a number does (``1e5``)."""
+    """True where the first cell of a list is a word: it has a letter and does not begin like a number (``1e5``)."""
     return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
 
 
 def _integer(text: str) -> int | None:
-    """The integer, of at most 18 digits, that a cell is."""
+    """The integer, of at most 18 digits, in a cell."""
     return int(text) if re.fullmatch(r"-?\d{1,18}", text) else None
 
 
@@ -122,7 +122,7 @@ def _quoted(text: str) -> str:
 
 
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
-    """The patches that the clouds of an outline span, as one surface [mm]; ``place`` is the key of the clouds."""
+    """The patches spanned by the clouds of an outline, as one surface [mm]; ``place`` is the key of the clouds."""
     clouds = _clouds(path, outline.unit)
     points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     for name in outline.clouds:
@@ -137,7 +137,7 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
-    """Landmarks [mm] by cloud from rows ``cloud,landmark,x,y,z`` below a header row."""
+    """Landmarks [mm] by cloud, from rows ``cloud,landmark,x,y,z`` below a header row."""
     clouds: dict[str, list[list[float]]] = {}
     for number, row in enumerate(files.read_rows(path)[1:], start=2):
         try:

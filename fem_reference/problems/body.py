@@ -1,6 +1,6 @@
 """Bodies of any shape: straight or curved cells, boundary conditions, effects and contact.
 
-It knows no solver.
+Independent of any solver.
 """
 
 from collections.abc import Callable
@@ -20,8 +20,8 @@ from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
 Kind = Literal["tetrahedron", "hexahedron"]
-# By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell). Where
-# both are of one degree, solvers stabilise the pressure (``is_stabilised``).
+# By element: kind of cell, degree of the displacement, degree of the pressure (None: no such unknown; 0: constant in each cell).
+# Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
 ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "P1": ("tetrahedron", 1, None),
     "P1/P1": ("tetrahedron", 1, 1),
@@ -36,10 +36,10 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """True of an element with displacement and pressure of one degree, which alone leave the pressure free to oscillate.
+    """True of an element with displacement and pressure of one degree, whose pressure would oscillate without stabilisation.
 
-    It has the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2`` besides, with the shear modulus mu of the cell at
-    rest, the mean of the second derivatives of the energy by F_ij, i != j. This energy falls with the square of the size of cells.
+    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the
+    mean of the second derivatives of the energy by F_ij, i != j. It falls with the square of the cell size.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
@@ -48,7 +48,7 @@ def is_stabilised(element: str) -> bool:
 
 
 def boundary_facets(mesh: "Cells") -> Ints:
-    """The facets that one cell alone has, as their corners (f, 3 or 4) in ascending order."""
+    """The facets that belong to only one cell, as their corners (f, 3 or 4) in ascending order."""
     if mesh.kind == "tetrahedron":
         sides = [np.delete(np.arange(4), i) for i in range(4)]
     else:
@@ -67,11 +67,11 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
     element
         A key of ``ELEMENTS``, such as ``"P2/P1"``.
     kind, degree
-        Of the cells; the displacement must be of this degree or above.
+            Those of the cells; the displacement must be of this degree or above.
     effects
-        The element must have a pressure if and only if one of them brings it.
+            The element must have a pressure if and only if an effect needs it.
     place
-        What the error names.
+            The key that the error names.
 
     """
     if element not in ELEMENTS:
@@ -89,14 +89,14 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:
-    """Raise an InputError where quadrature of a ``degree`` does not see how a pressure that is stabilised varies in a cell."""
+    """Raise an InputError where quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
     if degree == 1 and is_stabilised(element):
         raise InputError(place, degree, f"2 or more for {element}, whose pressure is stabilised")
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
-    """Places of the nodes of a cell in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
-    ``Cells.cells`` has. Corners first, in the order of (z, y, x); then for degree 2 the other nodes in the same order.
+    """Positions (k, 3) of a cell's nodes in the reference cell (unit tetrahedron or unit cube), in the order of ``Cells.cells``:
+    corners first, ordered by (z, y, x); for degree 2 then the other nodes in the same order.
     """
     ticks = np.arange(3) / 2
     x, y, z = (axis.ravel() for axis in np.meshgrid(ticks, ticks, ticks, indexing="ij"))
@@ -135,20 +135,20 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A displacement that is prescribed on a part of the surface.
+    """A prescribed displacement of a part of the surface.
 
     Parameters
     ----------
     name
-        By which the force on it is reported.
+            Under which its reaction force is reported.
     on
         A region of ``Cells.facets``, or a skin.
     components
-        The axes along which it is prescribed: 0, 1, 2 for x, y, z.
+            The prescribed axes: 0, 1, 2 for x, y, z.
     path
-        A picklable callable of rest points (n, 3) [mm] and a frame number; displacements (n, 3) [mm].
+            A picklable callable of rest points (n, 3) [mm] and a frame number; returns displacements (n, 3) [mm].
     stiffness
-        [MPa/mm] of springs over the area that pull towards it; None: exact. A skin has springs only.
+            [MPa/mm] of springs over the area that pull towards the path; None: exact. A skin has springs only.
 
     """
 
@@ -160,7 +160,7 @@ class Prescribed:
 
     def displacements(self, points: Floats, frame: float) -> Floats:
         """Displacements (n, 3) [mm] that the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the
-        others; InputError where it has no displacements for them.
+        others; InputError where the path gives none.
         """
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
@@ -168,7 +168,7 @@ class Prescribed:
             if np.iscomplexobj(found):
                 raise TypeError("complex numbers")
             found = np.asarray(found, float)
-        except Exception as error:  # whatever a function of the caller's own does wrong
+        except Exception as error:  # any error in a function of the caller
             raise InputError(place, f"{type(error).__name__}: {error}", want) from error
         if found.shape != points.shape:
             raise InputError(place, f"displacements {found.shape} of points {points.shape}", want)
@@ -188,9 +188,9 @@ class ByCell:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, with every bone. ``interval`` [s]: from a frame number to the next, None where nothing
-    depends on time. ``start``: at ``frames[0]`` the body is where this takes rest points (n, 3), and not at rest.
+    """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
+    ``contact``, if any, acts with every bone. ``interval`` [s]: the time between frame numbers, None where nothing depends on
+    time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, where the body does not start at rest.
     """
 
     mesh: Cells
@@ -208,7 +208,7 @@ class Body:
 
     @property
     def first(self) -> float:
-        """The first frame that is wanted: what overlaps at rest is relaxed before it."""
+        """The first requested frame: an overlap at rest is relaxed before it."""
         relaxed = self.contact.relaxed if self.contact else None
         return self.frames[0] if relaxed is None else relaxed[1]
 
@@ -223,8 +223,8 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which a load step ends, so that none leaves out what happens within it; InputError where a path cannot
-        be followed.
+        """Frame numbers at which a load step ends, so that none skips over motion within it; InputError where a path cannot be
+        followed.
         """
         things = [_moving(entry, some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]

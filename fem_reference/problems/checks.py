@@ -1,4 +1,4 @@
-"""Checks of bodies before they are solved: every part is checked, and named where it is wrong."""
+"""Checks of bodies before they are solved; errors name the part that is wrong."""
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
@@ -14,18 +14,18 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
 from fem_reference.problems.contact import ContactBone, ContactLaw
 
-SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
-_UNIT = 1e-6  # by which a unit vector may be longer or shorter
-_FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
+SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
+_UNIT = 1e-6  # the tolerance on the length of a unit vector
+_FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume counts as flat
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # of a box
-_SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and of each other
+_SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
 
 
 def check(body: Body, element: str) -> None:
-    """InputError unless ``body`` is one, ``element`` suits its cells and effects, it has every region and fibre direction that it
-    speaks of, and prescribes what can be distinguished, followed and solved.
+    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that
+    it names exist, and its constraints can be distinguished, followed and solved.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -49,7 +49,7 @@ def check(body: Body, element: str) -> None:
 
 
 def check_box(counts: object, size: object, kind: object, degree: object) -> None:
-    """InputError unless a box has numbers of cells, lengths, a kind of cell and a degree."""
+    """Raise InputError unless the numbers of cells, the lengths, the kind of cell and the degree of a box are valid."""
     if not isinstance(counts, tuple | list) or len(counts) != 3 or not all(_is_integer(n) and n > 0 for n in counts):
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
@@ -71,7 +71,7 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
 
 
 def check_frames(frames: object, place: str) -> None:
-    """InputError unless ``frames`` are numbers, each later than the one before."""
+    """Raise InputError unless ``frames`` are increasing numbers."""
     if isinstance(frames, str | bytes) or not isinstance(frames, Sequence | np.ndarray) or len(frames) == 0:
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(_is_number(one) for one in frames):
@@ -83,15 +83,15 @@ def check_frames(frames: object, place: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    """True of a finite number that is not a truth value."""
+    """True of a finite number that is not a bool."""
     if not isinstance(value, int | float | np.integer | np.floating) or _is_truth(value):
         return False
-    number: Any = value  # of whatever type, and size
+    number: Any = value  # of any type and size
     return bool(abs(number) <= _FARTHEST)
 
 
 def _is_integer(value: Any) -> bool:
-    """True of an integer that is not a truth value."""
+    """True of an integer that is not a bool."""
     return isinstance(value, int | np.integer) and not _is_truth(value)
 
 
@@ -108,7 +108,7 @@ def _check_many(place: str, given: Any, kind: type, want: str) -> None:
 
 
 def _check_rest(body: Body) -> None:
-    """InputError where an optional part of a body is not what it should be."""
+    """Raise InputError where an optional part of a body is of the wrong type."""
     if body.interval is not None and not (_is_number(body.interval) and body.interval > 0):
         raise InputError("interval", said(body.interval), "a time above 0 s, or None")
     for name in ("fibre", "start"):
@@ -125,7 +125,7 @@ def _check_rest(body: Body) -> None:
 
 
 def _check_cells(mesh: Any) -> None:
-    """InputError unless ``mesh`` has finite points, and cells and facets between them."""
+    """Raise InputError unless ``mesh`` has finite points, and cells and facets between them."""
     if not isinstance(mesh, Cells):
         raise InputError("mesh", said(mesh), "Cells")
     _check_kind("mesh.", mesh.kind, mesh.degree)
@@ -155,7 +155,7 @@ def _check_indices(place: str, given: Any, widths: tuple[int, ...], count: int) 
 
 
 def _check_volumes(mesh: Cells) -> None:
-    """InputError where a cell has no volume."""
+    """Raise InputError where a cell has no volume."""
     corners = mesh.points[mesh.cells[:, [0, 1, 2, 3 if mesh.kind == "tetrahedron" else 4]]]
     edges = corners[:, 1:] - corners[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
@@ -165,7 +165,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
-    """InputError where two share a name, by which their forces are reported, or springs would repel."""
+    """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
     names = [entry.name for entry in prescribed]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
@@ -190,7 +190,7 @@ def _check_components(place: str, components: Any) -> None:
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
-    """InputError unless each of the regions ``names`` has facets, all of them on the boundary of the cells."""
+    """Raise InputError unless each region in ``names`` has facets, all of them on the boundary of the cells."""
     boundary = set(map(tuple, boundary_facets(mesh).tolist()))
     for name in names:
         facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
@@ -205,7 +205,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
 
 
 def _check_needs(body: Body) -> None:
-    """InputError where an effect needs fibre directions or times that a body lacks, or these are no unit vectors."""
+    """Raise InputError where an effect needs fibre directions or times that a body lacks, or directions are no unit vectors."""
     needs = {need for effect in body.effects for need in effect.needs}
     if body.interval is None and "interval" in needs:
         raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
@@ -216,7 +216,7 @@ def _check_needs(body: Body) -> None:
     cells = np.arange(len(body.mesh.cells))
     try:
         found = np.asarray(body.fibre(cells, body.mesh.points[body.mesh.cells].mean(axis=1)), float)
-    except Exception as error:  # whatever a function of the caller's own does wrong
+    except Exception as error:  # any error in a function of the caller
         raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
     if found.shape != (len(cells), 3):
         raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
@@ -227,8 +227,8 @@ def _check_needs(body: Body) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """InputError where two regions prescribe different displacements exactly at places that they share, or a path of what moves
-    cannot be followed.
+    """Raise InputError where two regions prescribe different exact displacements at shared places, or a path of motion cannot be
+    followed.
     """
     looked_at = _looked_at(body)
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]
@@ -245,7 +245,7 @@ def check_agreement(body: Body) -> None:
 
 
 def _check_start(body: Body) -> None:
-    """InputError where something is prescribed elsewhere than at rest at the first frame, at which a body is at rest."""
+    """Raise InputError where a prescribed displacement is not zero at the first frame, at which a body is at rest."""
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
@@ -256,7 +256,7 @@ def _check_start(body: Body) -> None:
 
 
 def _looked_at(body: Body) -> Floats:
-    """Frames, and stops, and the middles between them."""
+    """The sampled frames: all frames, all stops, and the middles between them."""
     ends = np.unique([*body.frames, *body.stops])
     return np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
 

@@ -1,4 +1,4 @@
-"""The contents of a case in words and numbers: what a person asks of it before solving it."""
+"""The contents of a case in words and numbers, for a look before it is solved."""
 
 from typing import Any
 
@@ -61,7 +61,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
 
 
 def _shape(bone: Bone) -> str:
-    """The fineness of the surface of a bone, or its closed form."""
+    """The number of triangles of a bone's surface, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)

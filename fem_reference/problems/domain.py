@@ -14,7 +14,7 @@ from fem_reference.scenes.scalar import Interval, MeshFiles, ScalarCase
 
 
 def mesh_of(case: ScalarCase) -> FieldMesh:
-    """The mesh of a scalar case; InputError names what is not usable."""
+    """The mesh of a scalar case; InputError names what is unusable."""
     domain = case.domain
     if domain.mesh is not None:
         return _mesh_files(case, domain.mesh)
@@ -55,7 +55,7 @@ def _mesh_files(case: ScalarCase, given: MeshFiles) -> FieldMesh:
 
 
 def numbers(path: Path) -> Floats:
-    """The comma separated numbers of a file as a table."""
+    """The comma-separated numbers of a file as a table."""
     rows = files.read_rows(path)
     for i, row in enumerate(rows):
         if len(row) != len(rows[0]):
@@ -70,7 +70,7 @@ def numbers(path: Path) -> Floats:
 
 
 def whole_numbers(path: Path, values: Floats) -> Ints:
-    """The numbers of vertices that ``values`` of a file are; InputError where they are none."""
+    """``values`` of a file as numbers of vertices; InputError where they are none."""
     wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
     if wrong.any():
         raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")

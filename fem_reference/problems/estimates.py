@@ -1,4 +1,4 @@
-"""Estimates for the case of a muscle before it is solved, and the effects that it needs by them."""
+"""Estimates for a muscle case before it is solved, and the effects that they show to be needed."""
 
 import logging
 from collections.abc import Mapping
@@ -37,28 +37,28 @@ from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
-# What an effect may change without being needed, in sizes of the tetrahedra that the scene is solved on, or in the travel of its
-# surface where that is less: error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of the
+# The change by an effect that is negligible, in sizes of the scene's tetrahedra, or in the travel of its surface where
+# that is less: error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of the
 # latter; those of fibre lengths and volumes are tighter where only these change.
 TOLERANCE = 0.005
-# What an effect may make of stress without being needed, in the stress of what acts otherwise; of which this strain, which rounding
-# makes, is the least.
+# The negligible change of stress by an effect, relative to the stress of the other effects; the least such stress is that of this
+# strain, which rounding makes.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# By how much of the way that a point goes past a bone the guess of where it is may be wrong. In `hip_flexion` it is by 0.83.
+# The error of the guessed position of a point, as a share of its path past a bone. In `hip_flexion` it is 0.83.
 _DOUBT = 1.0
-# So many frames, evenly spread, and so many vertices are looked at.
+# The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
-_PLACES = 6000  # where contact is felt, of which it is looked how near they come to bones
-_ALONG = 0.7  # of a direction lies in triangles that are asked for the stretch along it
-_STILL = 1e-6  # [mm], what rounding moves
+_PLACES = 6000  # contact points, sampled for their distance to bones
+_ALONG = 0.7  # the share of a direction in the plane of triangles that are sampled for the stretch along it
+_STILL = 1e-6  # [mm] of motion by rounding
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and what is allowed of that,
-    ``bound`` [mm] and ``stress_bound`` [MPa]; ``turned_out``: the frame whose solution showed it, None where it was known before;
-    ``listed``: it acts whether needed or not.
+    """Decision whether an effect is ``needed``, by its ``indicator`` (None: part of the material) and the allowed values
+    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where estimates did;
+    ``listed``: the effect acts in any case.
     """
 
     effect: Effect
@@ -87,7 +87,7 @@ class Decision:
 
     @property
     def _because(self) -> str:
-        """The quantities that decided: those that are more than is allowed, or all where none is."""
+        """The quantities that decided: those above their allowed value, or all where none is."""
         assert self.indicator is not None
         estimate, stress, most = self.indicator.estimate, 1e3 * self.indicator.stress, 1e3 * self.stress_bound
         said = [
@@ -105,15 +105,13 @@ def decisions(case: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
 
 
 def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decision:
-    """Decide whether an ``effect`` is needed by what its indicator ``found``."""
+    """Decide whether an ``effect`` is needed, by its indicator ``found``."""
     within = found is not None and found.estimate <= known.tolerance and found.stress <= known.stress_tolerance
     return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
 
 def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float, at: Floats) -> Estimates:
-    """Estimates that were ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those
-    ``bones``.
-    """
+    """The ``known`` estimates, updated with the surface ``at`` (n, 3) of a solved frame and its distance to ``bones``."""
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
     return replace(
@@ -125,12 +123,12 @@ def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float
 
 
 def _chosen(rest: Setup) -> Ints:
-    """The vertices that are looked at."""
+    """The sampled vertices."""
     return np.unique(np.linspace(0, len(rest.surface.points) - 1, _VERTICES).astype(int))
 
 
 def estimates(case: MuscleCase, rest: Setup) -> Estimates:
-    """Estimates that effects ask of a case, by a guess of where the surface goes, each point with the bones nearest to it."""
+    """Estimates that effects need of a case, from a guessed path of the surface; each point with the bones nearest to it."""
     frames, chosen = _sampled(case.numbers), _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
     guess, felt = Guess.of(points, rest), Guess.of(places, rest)
@@ -167,14 +165,14 @@ def _sampled(numbers: tuple[int, ...]) -> list[int]:
 
 
 def _instants(case: MuscleCase) -> tuple[float, ...]:
-    """All frame numbers, and those between them at which a ramp has a knot."""
+    """All frame numbers, and the knots of ramps between them."""
     knots = [knot.frame for effect in case.effects if isinstance(effect, Ramped) for knot in effect.ramp]
     first, last = case.frames.first, case.frames.last
     return tuple(sorted({*map(float, case.numbers), *(knot for knot in knots if first <= knot <= last)}))
 
 
 def _shear(case: MuscleCase) -> float:
-    """The shear modulus at rest [MPa] of all that is stored in the material, without fibres."""
+    """The shear modulus at rest [MPa] of the stored energies, without fibres."""
     laws = [
         (one, 1.0) for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)
     ]
@@ -185,22 +183,22 @@ def _shear(case: MuscleCase) -> float:
 
 
 def _tension(case: MuscleCase) -> float:
-    """The stress that all fibres pull with at their length at rest [MPa], the mean over the frames."""
+    """The stress of all fibres at their rest length [MPa], the mean over the frames."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     amounts = [np.mean([one.amount(number) for number in case.numbers]) for one in pulling]
     return float(sum(amount * fibre_tension(one, 1.0) for one, amount in zip(pulling, amounts, strict=True)))
 
 
 def _taut(case: MuscleCase) -> float:
-    """The stretch of fibres at rest, at the most over the frames."""
+    """The greatest stretch of fibres at rest, over the frames."""
     rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(case)
     found = [elastic_state([(one, one.amount(number)) for one in case.effects], rest).F[0][0] for number in amounts]
     return float(max(found))
 
 
 def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
-    """The smallest and the greatest stretch of fibres that is to be expected: of the line between attachments, and of what is bent
-    by as much as bones turn.
+    """The smallest and the greatest expected stretch of fibres: from the line between attachments, and from bending by as much as
+    the bones turn.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0
@@ -213,8 +211,8 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
 
 
 def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments;
-    without the hundredths of its area where it is least and most, which single triangles at a rim may be.
+    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. The
+    hundredths of its area at both extremes are left out, as single triangles at a rim may be there.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0
@@ -236,7 +234,7 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
 
 
 def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
-    """The gap to a ``bone`` of ``points`` (n, 3) that are ``moved``, wrong by ``doubt`` of their path past it at most."""
+    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a share of their path past it."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)

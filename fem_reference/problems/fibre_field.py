@@ -1,4 +1,4 @@
-"""The fibres of a scene: lines whose lengths are measured, and a direction at every point; the same in all meshes."""
+"""The fibres of a scene: lines whose lengths are measured, and a direction at every point; independent of the mesh."""
 
 import logging
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
-# Fibres are traced in a mesh of their own, of about so many tets.
+# Fibres are traced in a separate mesh of about this many tets.
 TETS = 8000
 
 
@@ -24,16 +24,16 @@ def of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> 
     Parameters
     ----------
     case
-        Says which.
+            Defines the fibres.
     surface
         The closed surface of the muscle.
     fill
-        Makes tetrahedra of a size [mm], in which fibres are traced.
+            Fills the muscle with tetrahedra of a size [mm], in which fibres are traced.
 
     Returns
     -------
     fibres, directions
-        The lines, and a callable for the direction at any point: of the field, or of the nearest given line.
+            The lines, and a callable for the direction at any point: that of the field, or of the nearest given line.
 
     """
     if case.fibres.polylines is not None:
@@ -49,8 +49,8 @@ def of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> 
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
-    """The lean of fibres that are given against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, a their
-    angle to it, which is the shear by their tension. 0 of those that are traced from one attachment to the other.
+    """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
+    it. It is the shear by their tension. 0 for fibres that are traced from one attachment to the other.
     """
     if case.fibres.polylines is None:
         return 0.0
@@ -63,7 +63,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with every point outside the ``surface`` moved to its nearest point: outside, a solution says nothing."""
+    """The fibres with each point outside the ``surface`` moved to its nearest point, as there is no solution outside."""
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

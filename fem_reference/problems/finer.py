@@ -1,4 +1,4 @@
-"""Bodies on finer cells: each cell cut in eight parts of half its size, which fill the same and have the same regions."""
+"""Bodies on finer cells: each cell is cut into eight parts of half its size, with the same volume and regions."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -13,13 +13,13 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Kind, reference_nodes
 from fem_reference.problems.shapes import facet_corners
 
-# The shares that the corners of a cell have in the nodes of its parts are multiples of one over this.
+# The shares of a cell's corners in the nodes of its parts are multiples of one over this.
 _SHARES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class OfParts:
-    """The fibre directions in the parts of cells, of which each cell has eight in a row, from those in the cells."""
+    """The fibre directions in the parts of cells, eight successive parts per cell, taken from the cells."""
 
     fibre: Directions
 
@@ -29,8 +29,8 @@ class OfParts:
 
 
 def finer(body: Body) -> tuple[Body, Ints]:
-    """The ``body`` with each of its cells cut in eight, and which of its points those of ``body`` (n,) are, -1 of one of no cell.
-    Its shape stays that of the coarser cells: no surface gets smoother.
+    """The ``body`` with each cell cut into eight, and the number (n,) of each point of ``body`` in it, -1 for a point of no cell.
+    The shape stays that of the coarser cells: no surface gets smoother.
     """
     mesh, shared = _cut(body.mesh)
 
@@ -47,7 +47,7 @@ def finer(body: Body) -> tuple[Body, Ints]:
 
 
 def _cut(mesh: Cells) -> tuple[Cells, Ints]:
-    """The mesh with its cells in eight, and which of its points those of ``mesh`` (n,) are."""
+    """The mesh with its cells cut into eight, and the number (n,) of each point of ``mesh`` in it."""
     own = reference_nodes(mesh.kind, mesh.degree)
     nodes = _linear(mesh.kind, own) @ _parts(mesh.kind)  # (8, k, 3), in the reference cell
     shares = np.rint(_SHARES * _linear(mesh.kind, nodes)).astype(np.int64)  # (8, k, c)
@@ -58,13 +58,13 @@ def _cut(mesh: Cells) -> tuple[Cells, Ints]:
     for i, node in enumerate(own):
         part, j = np.argwhere((nodes == node).all(axis=2))[0]
         shared[mesh.cells[:, i]] = names[:, part, j]
-    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # not but for rounding
+    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # equal but for rounding
     facets = _facets(mesh, names, shares)
     return Cells(points, names.reshape(-1, len(own)), mesh.kind, mesh.degree, facets), shared
 
 
 def _parts(kind: Kind) -> Floats:
-    """The corners (8, c, 3) of the parts of the reference cell, each as upright as that."""
+    """The corners (8, c, 3) of the parts of the reference cell, each of positive volume."""
     corners = reference_nodes(kind, 1)
     if kind == "hexahedron":
         return np.stack([(corners + low) / 2 for low in product((0, 1), repeat=3)])
@@ -75,7 +75,7 @@ def _parts(kind: Kind) -> Floats:
 
 
 def _linear(kind: Kind, places: Floats) -> Floats:
-    """The share (..., c) that each corner has in places (..., 3) of the reference cell."""
+    """The share (..., c) of each corner at places (..., 3) of the reference cell."""
     if kind == "tetrahedron":
         return np.asarray(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
     corners, beside = reference_nodes(kind, 1), places[..., None, :]
@@ -83,8 +83,8 @@ def _linear(kind: Kind, places: Floats) -> Floats:
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The share (q, k) that each node has in ``places`` (q, 3) of the reference cell: the polynomials that are 1 there and 0 at the
-    other nodes.
+    """The values (q, k) of the nodes' polynomials, 1 at their node and 0 at all others, at ``places`` (q, 3) of the reference
+    cell.
     """
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
 
@@ -95,8 +95,8 @@ def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with these ``corners`` (m, c), and which of all is the first of each.
-    Nodes are the same where the same corners have the same ``shares`` (8, k, c): those of bodies that touch stay two.
+    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes
+    are equal where the same corners have the same ``shares`` (8, k, c), so nodes of touching bodies stay separate.
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)
@@ -107,10 +107,10 @@ def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
 
 
 def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
-    """The regions on the parts: those facets of theirs that lie on a facet of the region."""
+    """The regions on the parts: those of their facets that lie on a facet of the region."""
     sides = facet_corners(mesh.kind)
     every = np.arange(shares.shape[-1])
-    parts = []  # of each side, those facets (part, corners of the part) that lie on it
+    parts = []  # for each side, the facets (part, corners of the part) that lie on it
     for side in sides:
         off = shares[:, every[:, None], np.setdiff1d(every, side)].any(axis=2)  # (8, c)
         parts.append([(part, other) for part in range(8) for other in sides if not off[part, list(other)].any()])

@@ -1,4 +1,4 @@
-"""Guesses, before a muscle is solved, of its path by the motion of its bones, and of its shape as a beam."""
+"""Guesses, before a solution, of the path of a muscle from the motion of its bones, and of its shape as a beam."""
 
 from dataclasses import dataclass, replace
 
@@ -14,9 +14,9 @@ from fem_reference.problems.setup import Bone, Setup
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A guess where ``points`` (n, 3) go that follow ``bones`` by ``weights`` (n, b): as one over the distance to their
-    attachments, so that what is between two of them goes straight, as a muscle does that is pulled tight; to the bones, where
-    nothing is attached.
+    """A guess of the path of ``points`` (n, 3), which follow ``bones`` by ``weights`` (n, b): the inverse distances to their
+    attachments, so that the muscle between two of them stays straight, as under tension; the inverse distances to the bones
+    where nothing is attached.
     """
 
     points: Floats
@@ -35,12 +35,12 @@ class Guess:
         return cls(points, bones, near / near.sum(axis=1, keepdims=True))
 
     def at(self, frame: float) -> Floats:
-        """Places (n, 3) [mm] at a frame."""
+        """Positions (n, 3) [mm] at a frame."""
         parts = zip(self.bones, self.weights.T, strict=True)
         return np.sum([share[:, None] * apply(bone.pose(frame), self.points) for bone, share in parts], axis=0)
 
     def some(self, count: int) -> "Guess":
-        """The guess of about so many of the points."""
+        """The guess for a sample of about ``count`` points."""
         every = slice(None, None, max(1, len(self.points) // count))
         return replace(self, points=self.points[every], weights=self.weights[every])
 
@@ -51,12 +51,12 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed sideways of an ``axis`` (3,), jump of velocity and acceleration of a guess, root mean square over
-    its points, by frame numbers: where the velocity changes more than it does before and after, it jumps.
+    """The greatest speed, speed sideways of an ``axis`` (3,), jump of velocity and acceleration of a guess, as root mean squares
+    over its points, by frame numbers. The velocity jumps where it changes more than before and after.
     """
     guess, at = guess.some(100), np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
     velocity = np.diff(np.stack([guess.at(frame) for frame in at]), axis=0) / (at[1] - at[0])
-    first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # it starts from rest
+    first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # starts from rest
     change = rms(np.diff(first, axis=0))
     typical = float(np.median(change))
     jumps = change[change > 5 * typical + 1e-12]
@@ -67,8 +67,8 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 
 def strain(points: Floats, moved: Floats) -> float:
-    """The strain of ``points`` (n, 3) that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
-    10.1107/S0567739476001873) leaves, root mean square, over that of the distances from the middle; 1 at most.
+    """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976, doi
+    10.1107/S0567739476001873), root mean square, over that of the distances from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
     left, _, right = np.linalg.svd(now.T @ rest)
@@ -90,7 +90,7 @@ def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
 
 
 def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
-    """The distance (f,) [mm] between the middles of the first attachment and of the last, by frame; nothing without two."""
+    """The distance (f,) [mm] between the middles of the first and the last attachment, by frame; empty without two."""
     if len(rest.attached) < 2:
         return np.zeros(0)
     ends = [centres(rest, number) for number in numbers]
@@ -98,7 +98,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """The effect of the motion of the bones on the muscle, in a sentence; nothing where it is not attached twice."""
+    """The effect of the bones' motion on the muscle, in a sentence; empty where it is not attached twice."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""
@@ -118,9 +118,8 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The distance [mm] that the axis gets from the straight line between two attachments: as it does at rest in the middle
-    third, and as it is bent by bones that turn; what is only shifted sideways is off by a twentieth of that, in two waves, which
-    are stiffer.
+    """The deviation [mm] of the axis from the straight line between two attachments: that at rest in the middle third, and that
+    of bending by bones that turn. A sideways shift deviates by a twentieth of that, in two waves, which are stiffer.
     """
     if len(rest.attached) < 2:
         return 0.0
@@ -133,13 +132,13 @@ def sag(rest: Setup, frames: list[int], travel: float) -> float:
 
 
 def turn(rest: Setup, frame: float) -> float:
-    """The angle [rad] by which the first and the last of the bones that are attached have turned against each other at a frame."""
+    """The angle [rad] between the first and the last attached bone at a frame, relative to rest."""
     first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
     return float(Rotation.from_matrix(first.T @ last).magnitude())
 
 
 def length_of(rest: Setup) -> float:
-    """The length [mm] from the first attachment to the last, or of all of the muscle where it has not two."""
+    """The length [mm] from the first attachment to the last, or of the whole muscle without two."""
     middles = centres(rest)
     extent = diagonal(rest.surface.points)
     return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent

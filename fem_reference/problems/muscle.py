@@ -1,4 +1,4 @@
-"""Muscles filled with tetrahedra and fibres, with the effects that act."""
+"""Muscles filled with tetrahedra and fibres, with their effects."""
 
 import time
 from dataclasses import dataclass, field, replace
@@ -51,16 +51,15 @@ from fem_reference.scenes.muscle import MuscleCase
 
 
 def kept_meshes() -> Path | None:
-    """The folder where tetrahedra are kept; it may be deleted. None: they are made each time."""
+    """The folder that keeps tetrahedra; it may be deleted. None: they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleProblem(Setup):
-    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
-    fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
-    attachment by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
-    to make.
+    """A set-up filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres. ``fibre``: the fibre
+    direction at any point, where an effect needs it; ``skin``: the contact surface, where there is contact; ``attached_skins``:
+    the points of springs, by attachment; ``mesh_facts``: facts on the mesh; ``seconds``: the time of meshing.
     """
 
     mesh: TetMesh
@@ -74,7 +73,7 @@ class MuscleProblem(Setup):
 
     @cached_property
     def directions(self) -> Floats | None:
-        """Unit vectors (k, 3) along the fibres in the middle of each tet, where an effect needs them."""
+        """Unit vectors (k, 3) along the fibres at the middle of each tet, where an effect needs them."""
         middles = self.mesh.points[self.mesh.tets].mean(axis=1)
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
@@ -85,12 +84,12 @@ class MuscleProblem(Setup):
 
     @property
     def rest(self) -> AtRest:
-        """All that frames of it move."""
+        """All shapes that its frames move."""
         return AtRest(self.surface, self.fibres, self.mesh, self.directions)
 
     @cached_property
     def body(self) -> Body:
-        """The finite elements that it is solved with; InputError as :func:`body_of` says."""
+        """The finite element body of the muscle; InputError as in :func:`body_of`."""
         return body_of(self, self.mesh, self.effects, self.fibre, self.skin, self.attached_skins)
 
     @property
@@ -106,7 +105,7 @@ class MuscleProblem(Setup):
 
 
 def setup(case: MuscleCase) -> Setup:
-    """Read and check the surfaces of a case and choose its attachments; InputError names what is not usable."""
+    """Read and check the surfaces of a case and choose its attachments; InputError names what is unusable."""
     place = join(case.place, "muscle.surface")
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
@@ -147,7 +146,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
 
 
 def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
-    """The points that springs pull at, ``apart`` [mm] from each other, by attachment."""
+    """The points of springs, ``apart`` [mm] from each other, by attachment."""
     return {
         one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
         for one in rest.attached
@@ -156,8 +155,8 @@ def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """The distance grid of each bone of a file: its spacing, root mean square and greatest error [mm]; InputError where contact
-    cannot be felt by the bones and the surface that there are.
+    """The distance grid of each bone from a file: its spacing, root mean square and greatest error [mm]; InputError where the
+    bones and the surface do not allow contact.
     """
     pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
     check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
@@ -173,7 +172,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def _filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher keeps it, else those
+    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher preserves it, else those
     under it.
     """
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
@@ -217,14 +216,14 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
+    """The body of a ``bone`` with a closed form; None where it is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """The maker of the mesh, its size and quality, and for each attachment the area attached on the surface and on the tets and how
-    many of its vertices are more than ``far`` [mm] from the facets attached: islands that tets do not resolve.
+    """Mesher, size and quality of the mesh; and for each attachment the attached area on the surface and on the tets, and the
+    number of its vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {

@@ -1,4 +1,4 @@
-"""The muscle of a problem as a body that finite elements deform: attached to bones, and in contact with them."""
+"""The muscle of a problem as a finite element body, attached to bones and in contact with them."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,11 +18,11 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.setup import Bone, Setup
 
-# Frame numbers before the first one over which an overlap at rest is removed.
+# Frame numbers before the first over which an overlap at rest is removed.
 RELAXING = 10
-# Where a bone is overlapped at rest down to this share of its half thickness, no direction leads out.
+# Where the overlap at rest reaches down to this share of a bone's half thickness, no direction leads out.
 _MIDDLE = 0.95
-# Cells that are so many times longer than thick: stiffnesses are as the square of that, and 16 digits do not hold both.
+# The greatest ratio of a cell's length to its thickness: stiffnesses differ by its square, and 16 digits do not hold both.
 _THINNEST = 1e6
 
 
@@ -34,9 +34,9 @@ def body_of(
     skin: Skin | None,
     attached_skins: Mapping[str, Skin],
 ) -> Body:
-    """The muscle of a ``setup`` as a body of ``mesh``: its bones prescribe where exactly attached facets are, or pull by springs at
-    ``attached_skins``; the rest of its surface is ``"free"``, of which ``skin`` feels contact. InputError where two of them
-    prescribe different things, or one moves as nothing can follow.
+    """The muscle of a ``setup`` as a body of ``mesh``. Its bones prescribe the motion of exactly attached facets, or pull by
+    springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where two bones
+    prescribe different motions, or one moves in a way that cannot be followed.
     """
     _check_thickness(mesh)
     attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in setup.attached)])
@@ -65,7 +65,7 @@ def body_of(
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
-    """The body with the bones in contact with it; where they overlap it at rest, it is relaxed before the first frame."""
+    """The body with its bones in contact; where they overlap it at rest, it is relaxed before the first frame."""
     pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
     nearest = min((_nearest(bone, points) for bone in pressing), default=np.inf)
@@ -88,7 +88,7 @@ def _nearest(bone: Bone, points: Floats) -> float:
 
 
 def _check_thickness(mesh: TetMesh) -> None:
-    """InputError where a cell is too thin for double precision."""
+    """Raise InputError where a cell is too thin for double precision."""
     corners = mesh.points[mesh.tets]
     longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
     ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))

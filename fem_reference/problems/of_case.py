@@ -1,4 +1,4 @@
-"""Case -> problem, whatever is solved in it."""
+"""Case -> set-up and problem, of a muscle or a scalar field."""
 
 import logging
 from collections.abc import Callable
@@ -23,17 +23,15 @@ log = logging.getLogger(__name__)
 
 
 class CaseSetup(Problem, Protocol):
-    """Facts on a case that are known before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the
-    whole ``FieldProblem``.
-    """
+    """A case before meshing, with all that judging its runs needs: the ``Setup`` of a muscle, or the whole ``FieldProblem``."""
 
     @property
     def exact(self) -> str | None:
-        """The formula of the solution, where it is known."""
+        """The formula of the solution, where known."""
 
     @property
     def bones(self) -> tuple[Bone, ...]:
-        """The bones, of which a scalar field has none."""
+        """The bones; a scalar field has none."""
 
     @property
     def exempt(self) -> Exemption | None:
@@ -41,24 +39,24 @@ class CaseSetup(Problem, Protocol):
 
     @property
     def body(self) -> Body | None:
-        """The finite elements that a muscle is solved with, once it is filled with them."""
+        """The finite element body of a muscle, once it is filled."""
 
     @property
     def field(self) -> FieldProblem | None:
-        """The scalar field, None of a muscle."""
+        """The scalar field, None for a muscle."""
 
 
 class CaseProblem(CaseSetup, Meshed, Protocol):
-    """A problem as a solver of cases is given it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
+    """The problem of a case as a solver receives it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
 
     @property
     def muscle(self) -> MuscleProblem | None:
-        """The muscle, None of a scalar field."""
+        """The muscle, None for a scalar field."""
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions whether a case needs each of its effects, and why, by its setup that ``rest`` gives, by default a new one; nothing
-    of a scalar field, which needs all.
+    """Decisions on whether a case needs each of its effects, and why, from the set-up that ``rest`` gives, by default a new one;
+    empty for a scalar field, which needs all.
     """
     if not isinstance(case, MuscleCase):
         return ()
@@ -68,15 +66,15 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
 
 
 def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """Everything that a person asks of what a case is made of, as words and numbers by name."""
+    """Facts on the contents of a case, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return contents.of_muscle(setup, case)
-    assert isinstance(setup, FieldProblem)  # there are no others
+    assert isinstance(setup, FieldProblem)  # there are no other types
     return contents.of_field(setup, case)
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """The effect of the motion of its bones on a muscle, and why it needs its effects, in words; nothing of a scalar field."""
+    """The effect of the bones' motion on a muscle, and why it needs its effects, in words; empty for a scalar field."""
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)
@@ -86,8 +84,8 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, where it leaves that to be found out (as ``explained``); with ``decisions`` that
-    say why.
+    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``
+    with their reasons.
     """
     if not isinstance(case, MuscleCase) or case.choice == "listed":
         return case
@@ -99,8 +97,8 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that the case left out, in frames that were solved; None where it left out none. ``rest`` is
-    its setup, ``built`` gives its problem.
+    """The watch for effects that the case omitted, in solved frames; None where it omitted none. ``rest`` is its set-up,
+    ``built`` gives its problem.
     """
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
@@ -119,7 +117,7 @@ def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
 
 
 def scalar_case(case: Case, place: str | None = None) -> ScalarCase:
-    """The ``case`` itself, where it is one of a scalar field; else InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself where it has a scalar field; else InputError at ``place``, by default the file of the case."""
     if not isinstance(case, ScalarCase):
         raise InputError(place or case.place, f'"{case.name}", the case of a muscle', "a scalar case")
     return case
@@ -132,10 +130,10 @@ def setup(case: ScalarCase) -> FieldProblem: ...
 @overload
 def setup(case: Case) -> CaseSetup: ...
 def setup(case: Case) -> CaseSetup:
-    """The set-up of a case. InputError names what is not usable."""
+    """The set-up of a case. InputError names what is unusable."""
     if isinstance(case, MuscleCase):
         return muscle.setup(case)
-    assert isinstance(case, ScalarCase)  # there are no others
+    assert isinstance(case, ScalarCase)  # there are no other types
     return scalar.build(case)
 
 

@@ -11,17 +11,17 @@ from fem_reference.foundations.motion import Turning, apply
 from fem_reference.problems.resolved_paths import turning
 
 Matrix = tuple[tuple[float, float, float], ...]
-ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to all of it at frame 1
+ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to the full amount at frame 1
 
 
 def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
-    """The amount that is prescribed at a frame: linear between ``knots`` of (frame, amount)."""
+    """The prescribed amount at a frame: linear between ``knots`` of (frame, amount)."""
     frames, amounts = zip(*knots, strict=True)
     return float(np.interp(frame, frames, amounts))
 
 
 def _straight(knots: tuple[tuple[float, float], ...]) -> Turning:
-    """Frames of ``knots``, between which nothing turns."""
+    """The frames of ``knots``, with no rotation between them."""
     return tuple(frame for frame, _ in knots), (0.0,) * len(knots)
 
 
@@ -51,14 +51,14 @@ class Affine:
         return np.asarray(amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift)))
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The knots, between which every point goes straight on."""
+        """The knots, between which every point moves straight."""
         return _straight(self.knots)
 
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length`` the
-    angle is per mm along the axis from the centre: a twist.
+    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length``
+    the angle is per mm along the axis from the centre: a twist.
     """
 
     axis: tuple[float, float, float]
@@ -81,7 +81,7 @@ class Turn:
         return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)
 
     def _arms(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """The unit vector of the axis, (n, 3) from the centre, and by how many times the angle each point turns (n,)."""
+        """The unit vector of the axis, the arms (n, 3) from the centre, and the factor of the angle at each point (n,)."""
         unit = np.array(self.axis) / np.linalg.norm(self.axis)
         arms = points - np.array(self.centre)
         return unit, arms, arms @ unit if self.per_length else np.ones(len(points))
@@ -89,7 +89,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Radial:
-    """Away from the origin along the axes that ``along`` counts (1) or not (0), by ``share`` of the distance times the amount."""
+    """Displacement away from the origin by ``share`` of the distance times the amount, along axes whose ``along`` is 1, not 0."""
 
     share: float
     along: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -100,13 +100,13 @@ class Radial:
         return np.asarray(amount(self.knots, frame) * self.share * points * np.array(self.along))
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The knots, between which every point goes straight on."""
+        """The knots, between which every point moves straight."""
         return _straight(self.knots)
 
 
 @dataclass(frozen=True)
 class From:
-    """A ``pose`` by frame number that begins at the ``first``, whatever motion it has before."""
+    """A ``pose`` by frame number that begins at the ``first``; earlier motion is ignored."""
 
     first: float
     pose: Callable[[float], Floats]
@@ -116,7 +116,7 @@ class From:
         return self.pose(max(frame, self.first))
 
     def turning(self, points: Floats) -> Turning | None:
-        """Frames and angles of the pose, from where it begins."""
+        """Frames and angles of the pose, from the first frame on."""
         known = turning(self.pose, points)
         if known is None or not known[0]:
             return known
@@ -126,7 +126,7 @@ class From:
 
 @dataclass(frozen=True)
 class Follows:
-    """The displacement of what is attached to a bone that has a ``pose`` by frame number."""
+    """The displacement of points attached to a bone with a ``pose`` by frame number."""
 
     pose: Callable[[float], Floats]
 
@@ -141,7 +141,7 @@ class Follows:
 
 @dataclass(frozen=True)
 class Along:
-    """One fibre direction everywhere, a unit vector."""
+    """A uniform fibre direction, a unit vector."""
 
     direction: tuple[float, float, float]
 

@@ -1,4 +1,4 @@
-"""Problems: what a muscle, a body and a scalar field share for those who solve and judge them."""
+"""Problems: the parts that muscles, bodies and scalar fields have in common."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 from fem_reference.foundations.records import Record
 
-# What a solver is asked for: a muscle, a scalar field, or a body of any shape.
+# The three problems that solvers take: a muscle, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
-# The surface of what has none.
+# The surface of a problem without one.
 NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 
 @dataclass(frozen=True, eq=False)
 class AtRest:
-    """Shapes at rest that frames of a run move, as far as there are any: the ``surface``, the ``fibres``, the tetrahedra of
-    ``mesh`` with the unit vector along the fibres in each of them, ``directions`` (m, 3).
+    """Rest shapes that the frames of a run move, where they exist: the ``surface``, the ``fibres``, the tetrahedra of ``mesh``
+    and the unit vector along the fibres in each of them, ``directions`` (m, 3).
     """
 
     surface: Surface = NO_SURFACE
@@ -32,17 +32,17 @@ NOTHING = AtRest()
 
 
 class Problem(Protocol):
-    """A problem that a solver is given: a muscle, a body or a scalar field."""
+    """A problem for a solver: a muscle, a body or a scalar field."""
 
     task: ClassVar[Task]
 
     @property
     def frames(self) -> Sequence[float]:
-        """The frame numbers wanted; at the first of them it is at rest, unless it says otherwise."""
+        """The requested frame numbers; the problem is at rest at the first, unless it states otherwise."""
 
     @property
     def rest(self) -> AtRest:
-        """The shapes that frames of it move."""
+        """The shapes that its frames move."""
 
 
 class Meshed(Problem, Protocol):
@@ -57,4 +57,4 @@ class Meshed(Problem, Protocol):
         """Size and quality of its mesh, by name."""
 
     def write_meshes(self, folder: Path, /) -> None:
-        """Write what it is solved on into ``folder``, for ParaView."""
+        """Write the mesh of the solution into ``folder``, for ParaView."""

@@ -1,1 +1,1 @@
-"""Runs: frames, status, cost and origin, and their store on disk."""
+"""Runs: frames, status, cost and provenance, and their store on disk."""

@@ -1,4 +1,4 @@
-"""Runs over all frames of a case: those that they did not reach are not a number."""
+"""Runs over all frames of a case: frames that they did not reach are not-a-number."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fem_reference.runs.store import Run
 
 
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:
-    """The run over exactly the frames ``numbers``; frames that it did not reach are not-a-number, so they never pass."""
+    """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
     if run.numbers == numbers:
         return run
     rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]

@@ -1,4 +1,4 @@
-"""The contents of run.json as a record: read strictly, so that a damaged one is refused and not half believed."""
+"""The contents of run.json as a record, read strictly: a damaged file is refused as a whole."""
 
 import json
 from itertools import pairwise
@@ -30,7 +30,7 @@ RunJson = dict[str, Any]
 
 
 class Origin(Record):
-    """Provenance of a run, as far as anything depends on it."""
+    """Provenance of a run, as far as results depend on it."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="allow")
     versions: dict[str, str] = Field(default_factory=dict)
@@ -38,7 +38,7 @@ class Origin(Record):
 
 
 class Contents(Record):
-    """The contents of run.json of a run that came to its end."""
+    """The contents of run.json of a finished run."""
 
     format: Literal[1]
     name: Name
@@ -68,7 +68,7 @@ class Contents(Record):
 
 
 def amend(folder: Path, **changes: Any) -> None:
-    """Write other values of some keys into the run.json in ``folder``."""
+    """Change the values of some keys in the run.json in ``folder``."""
     place = folder / "run.json"
     stored = texts.read_json(place, "a run")
     files.write_text(place, json.dumps(stored | changes, indent=1, allow_nan=False))

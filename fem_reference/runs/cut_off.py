@@ -1,4 +1,4 @@
-"""Runs that were cut off: which frames of them are stored, and the folder in which a solver keeps what it needs to go on."""
+"""Runs that were cut off: their stored frames, and the folder with the state from which a solver continues."""
 
 import json
 import shutil
@@ -14,13 +14,13 @@ from fem_reference.io import files, texts
 from fem_reference.runs.contents import Contents, RunJson
 
 FOLDER = "restart"
-# Killed with the process that stores it, or alone: for want of memory or room, say.
+# Killed with the process that stores it, or alone, for example for lack of memory or disk space.
 ENDED_EARLY = ("running", "crashed")
 
 
 @dataclass(frozen=True)
 class CutOff:
-    """The kept part of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
+    """The kept part of a run: the ``numbers`` of its stored frames, empty for a new run, and the ``folder`` that its solver may
     use until it ends.
     """
 
@@ -29,7 +29,7 @@ class CutOff:
 
 
 def stored(folder: Path, identity: RunJson) -> RunJson | None:
-    """The run.json of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
+    """The run.json of a run in ``folder`` that was cut off and can continue as the one of ``identity``, if there is one."""
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
@@ -41,23 +41,23 @@ def stored(folder: Path, identity: RunJson) -> RunJson | None:
         wanted = json.loads(json.dumps(identity))
         same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
         if wanted["origin"].get("settings", {}).get("store_state") and "state" not in whole.parts:
-            return None  # its frames lack what is asked for
+            return None  # its frames lack requested parts
         if same and whole.origin.versions == wanted["origin"].get("versions", {}):
-            for part in folder.rglob(".*"):  # what was being written
+            for part in folder.rglob(".*"):  # incomplete files
                 part.unlink()
             return state | {"status": "running", "message": "", "cost": {}}
     return None
 
 
 def truncate(state: RunJson, number: float) -> None:
-    """Take the frames from ``number`` on, which are solved again, out of a ``state`` as run.json has it."""
+    """Remove the frames from ``number`` on, which are solved again, from a ``state`` as in run.json."""
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
 
 
 def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
-    """Positions [mm] of the surface (n, 3) and of the points of the tets (k, 3), if there are any, in a stored frame of the run in
+    """Positions [mm] of the surface (n, 3) and of the points of the tets (k, 3), if any, in a stored frame of the run in
     ``folder``.
     """
     tets = folder / "tets" / f"frame_{number:04d}.vtu"
@@ -66,7 +66,7 @@ def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
 
 
 def pass_on(folder: Path, to: Path) -> None:
-    """Let the run of the folder ``to`` go on from what is kept of the stopped one in ``folder``, unless there is one already."""
+    """Let the run of the folder ``to`` continue from the kept part of the stopped one in ``folder``, unless it has its own."""
     if (folder / FOLDER).is_dir() and not to.exists():
         with tempfile.TemporaryDirectory(dir=to.parent) as new:
             copy = shutil.copytree(folder, Path(new) / to.name)
@@ -77,5 +77,5 @@ def pass_on(folder: Path, to: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove what a solver kept in the ``folder`` of a run that has come to its end."""
+    """Remove the restart files of a finished run from its ``folder``."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)

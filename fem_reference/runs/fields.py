@@ -13,13 +13,13 @@ from fem_reference.io import files
 from fem_reference.runs.states import read_arrays, write_arrays
 
 FOLDER = "field"
-VALUES = "psi"  # what the field itself is called
+VALUES = "psi"  # the name of the field itself
 
 
 @dataclass(frozen=True, eq=False)
 class NodalField:
-    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,), at the vertices, then for elements of order 2 at the middles of
-    ``mesh.edges``; and where a solver computes a vector that psi is the norm of, its ``components`` (n, d) at the vertices.
+    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the middles of
+    ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, where a solver computes one.
     ``form``: the weak form that was solved. After a failure psi is not-a-number.
     """
 
@@ -29,7 +29,7 @@ class NodalField:
 
 
 def write(path: Path, field: NodalField) -> None:
-    """Write a field: all its nodes as numbers, and into ``path``, a .vtu file, the vertices for ParaView."""
+    """Write a field: the values of all nodes as an array, and the vertices into ``path``, a .vtu file for ParaView."""
     mesh = field.mesh
     write_arrays(path.with_suffix(".npz"), {"points": mesh.points, "cells": mesh.cells} | field.arrays)
     shown = {name: values[: len(mesh.points)] for name, values in field.arrays.items()}
@@ -37,7 +37,7 @@ def write(path: Path, field: NodalField) -> None:
 
 
 def read(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, Floats]]:
-    """The mesh and by name the arrays (f, ...) of the frames in the ``folder`` of a run; InputError where a file is damaged."""
+    """The mesh, and by name the arrays (f, ...) of the frames, of the run in ``folder``; InputError where a file is damaged."""
     frames = []
     for number in numbers:
         path = folder / FOLDER / f"frame_{number:04d}.npz"
@@ -51,7 +51,7 @@ def read(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, F
 
 
 def _check(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> None:
-    """InputError where the arrays of a frame are none of a field, or of another mesh than those of the ``first``."""
+    """Raise InputError where a frame's arrays are not those of a field, or belong to another mesh than the ``first``."""
     points, cells, values = arrays["points"], arrays["cells"], arrays[VALUES]
     found = {name: (array.shape, array.dtype.kind) for name, array in arrays.items()}
     usable = (

@@ -13,7 +13,7 @@ from pathlib import Path
 from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
-# What makes problems of scenes determines every run; some of it is found by name as it runs, which no import shows.
+# Code that makes problems from scenes determines every run; some of it is found by name at run time, not by imports.
 _BEFORE = ("foundations", "io", "effects", "geometry", "scenes", "problems")
 _MADE_WITH = (
     "numpy",
@@ -29,8 +29,8 @@ _MADE_WITH = (
 
 
 def key(scene: str, solver: str, settings: Mapping[str, object]) -> str:
-    """A hash of 16 digits over all that determines a run: the key of its ``scene``, the ``solver`` with the ``settings`` that its
-    answer depends on, and :func:`code_hash`.
+    """A hash of 16 digits over all that determines a run: the key of its ``scene``, the ``solver`` with those ``settings`` that
+    affect its result, and :func:`code_hash`.
     """
     parts = [scene, solver, json.dumps(settings, sort_keys=True), code_hash(solver)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
@@ -47,8 +47,8 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files of ``package`` that determine the runs of ``solver``: the packages that make problems of scenes, and its own
-    modules with all that they import, from wherever they do.
+    """The files of ``package`` that determine the runs of ``solver``: the packages that make problems from scenes, and the
+    solver's modules with all their direct and indirect imports.
     """
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
@@ -60,12 +60,12 @@ def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
 
 
 def machine() -> str:
-    """The machine that this runs on."""
+    """The machine of this process."""
     return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of what was measured: our version, the machine and the ``manner`` of runs on it, and the versions of packages."""
+    """Provenance of a measurement: our version, the machine, the ``manner`` of running on it, and the versions of packages."""
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 
@@ -86,8 +86,8 @@ def _files(folder: Path) -> set[Path]:
 
 
 def _module(package: Path, parts: list[str]) -> set[Path]:
-    """The files of the module that is ``parts`` below ``package``, and of the packages that it is in but the first, which only
-    lists public names; of a solver that is a folder, all of it. Nothing where there is no such module.
+    """The files of the module ``parts`` below ``package``, and of the packages around it but the first, which only lists public
+    names; for a solver in a folder, the whole folder. Empty where there is no such module.
     """
     place = package.joinpath(*parts)
     if place.is_dir():
@@ -101,7 +101,7 @@ def _module(package: Path, parts: list[str]) -> set[Path]:
 
 @cache
 def _imported(path: Path, package: Path) -> tuple[str, ...]:
-    """Names that the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
+    """Names that the file at ``path`` imports from ``package``: modules, and what may be modules, without the package's name."""
     return tuple(_names(ast.parse(path.read_bytes()), path, package))
 
 

@@ -1,7 +1,7 @@
-"""Results of a reference run in full: displacement, stress, pressure, det F, fibre stretch and stress at any points in the muscle.
+"""Full results of a reference run: displacement, stress, pressure, det F, fibre stretch and stress at any points in the muscle.
 
-A run that was solved with ``store_state = true`` keeps its unknowns. Everything else follows from them: the deformation gradient
-from the functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
+A run solved with ``store_state = true`` keeps its unknowns. All results follow from them: the deformation gradient from the
+functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,16 +35,16 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point that is further outside the tets than this share of the mesh's diagonal is outside; nearer, it is rounding.
+# A point farther outside the tets than this share of the mesh's diagonal counts as outside; a nearer one is rounding.
 ROUNDING = 1e-9
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The ``states`` by frame number of a muscle that fills ``mesh``, where ``effects`` act; ``fibre`` (m, 3), the unit vector
-    along the fibres in the middle of each tet, where it is known. The solution has them at every quadrature point: in a bar of 6 mm
-    tets these differ from it by 2 degrees, root mean square.
+    """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3): the unit vector
+    along the fibres at the middle of each tet, where known. The solution has one at every quadrature point: in a bar of 6 mm tets
+    the two differ by 2 degrees, root mean square.
     """
 
     mesh: TetMesh
@@ -54,7 +54,7 @@ class Results:
 
     @property
     def frames(self) -> tuple[float, ...]:
-        """The frame numbers that there are."""
+        """The available frame numbers."""
         return tuple(self.states)
 
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
@@ -67,21 +67,21 @@ class Results:
         frame
             A frame number of ``frames``.
         names
-            What is wanted, by default all that there is: ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
-            ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, above 0 where the volume
-            grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa];
-            ``fibre_stress`` (n,) [MPa], the stress along the fibres as they are now.
+                Names of results, by default all that exist: ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
+                ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the
+            volume     grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa];
+                ``fibre_stress`` (n,) [MPa], the stress along the present fibre direction.
 
         Returns
         -------
         dict
-            The arrays by name. A point outside the tetrahedra has NaN everywhere. F and the stress jump from a tetrahedron to the
-            next: at a point that several share, they are those of one of these. Where det F is not above 0 there is no stress: NaN.
+                The arrays by name. A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra:
+            at a     shared point they are those of one tetrahedron. Where det F is not positive the stress is NaN.
 
         Raises
         ------
         InputError
-            Where there is no such frame, or no such result of this run.
+                Where the run has no such frame or no such result.
 
         """
         wanted = self._checked(names, self._state(frame))
@@ -97,7 +97,7 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """Results as of :meth:`evaluate`, at points inside given tetrahedra.
+        """Results as in :meth:`evaluate`, at points inside given tetrahedra.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Results:
         barycentric
             Coordinates (n, 4) in them.
         frame, names
-            As of :meth:`evaluate`.
+                As in :meth:`evaluate`.
 
         """
         state = self._state(frame)
@@ -121,7 +121,7 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def names(self, state: NodalState) -> tuple[str, ...]:
-        """Names of what can be evaluated of a state."""
+        """Names of the results that follow from a state."""
         lacking = {"pressure"} if state.pressure.shape[1] == 0 else set()
         lacking |= {"fibre_stretch", "fibre_stress"} if self.fibre is None else set()
         return tuple(name for name in NAMES if name not in lacking)
@@ -138,7 +138,7 @@ class Results:
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:
-        """The state at a ``frame``; InputError where there is none, or it is of other tetrahedra."""
+        """The state at a ``frame``; InputError where there is none, or it has other tetrahedra."""
         if frame not in self.states:
             raise InputError("frame", f"{frame:g}", f"one of {', '.join(f'{number:g}' for number in self.frames)}")
         state, m = self.states[frame], len(self.mesh.tets)
@@ -158,10 +158,10 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``, which is one of ``case``: a name, a folder or a scene.
+    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder or a scene.
 
-    InputError where there is no run with states, or it is of another scene (also where keys were changed after reading the case:
-    then the changed scene is needed).
+    InputError where there is no run with states, or it has another scene. Keys changed after reading the case count too: then the
+    changed scene is needed.
     """
     folder = Path(folder)
     run = store.load(folder)
@@ -173,7 +173,7 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
 
 
 class _Places:
-    """Points in ``tets`` (n,) of ``results`` at a state, with all that an effect may depend on there."""
+    """Points in ``tets`` (n,) of ``results`` at a state, with all quantities that an effect may depend on."""
 
     def __init__(self, results: Results, state: NodalState, tets: Ints, barycentric: Floats) -> None:
         self.results, self.state, self.tets, self.corners = results, state, tets, barycentric
@@ -184,7 +184,7 @@ class _Places:
         self.det_F = np.linalg.det(self.F)
 
     def _moved(self, nodal: Floats) -> tuple[Floats, Floats]:
-        """The displacement (n, 3) and deformation gradient (n, 3, 3) of values (m, k, 3) at nodes."""
+        """The displacement (n, 3) and deformation gradient (n, 3, 3) from values (m, k, 3) at nodes."""
         inside = nodal[self.tets]
         gradient = np.einsum("nai,nak->nik", inside, self.slopes)
         return np.asarray(np.einsum("na,nai->ni", self.functions, inside)), np.eye(3) + gradient
@@ -198,7 +198,7 @@ class _Places:
         return inside[:, 0] if inside.shape[1] == 1 else np.asarray((inside * self.corners).sum(axis=1))
 
     def values(self, names: Sequence[str], acting: Sequence[tuple[Effect, float]]) -> dict[str, Floats]:
-        """The arrays by name that ``Results.evaluate`` gives."""
+        """The arrays by name, as in ``Results.evaluate``."""
         values: dict[str, Any] = {
             "displacement": self.displacement,
             "deformation_gradient": self.F,
@@ -218,17 +218,17 @@ class _Places:
         return {name: values[name] for name in names}
 
     def cauchy_stress(self, acting: Sequence[tuple[Effect, float]]) -> Floats:
-        """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], W the sum of the energies per rest volume at the pressure unknown that there
-        is (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
+        """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], with W the sum of the energies per rest volume at the pressure unknown
+        (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
-        with np.errstate(all="ignore"):  # where det F is not above 0
+        with np.errstate(all="ignore"):  # where det F is not positive
             first = first_piola(acting, self._state(), len(self.tets))
             stress = np.einsum("nik,njk->nij", first, self.F) / self.det_F[:, None, None]
         stress[~(self.det_F > 0)] = np.nan
         return np.asarray(stress)
 
     def _state(self) -> State:
-        """The points as effects see them, the entries of F being the variables."""
+        """The points as effects see them, with the entries of F as variables."""
         state, jets = self.state, variables(self.F.reshape(-1, 9).T)
         passed = state.before if len(state.before) else np.zeros_like(state.displacement)
         before, F_before = self._moved(passed)
@@ -262,9 +262,9 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
     barycentric
         Coordinates L (n, 4) of points.
     gradients
-        Of the coordinates, (n, 4, 3) [1/mm].
+            Gradients of the coordinates, (n, 4, 3) [1/mm].
     count
-        Of nodes: 4 or 10, in the order of ``body.reference_nodes``.
+            Number of nodes: 4 or 10, in the order of ``body.reference_nodes``.
 
     Returns
     -------
@@ -287,7 +287,7 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
 
 
 def _ends() -> Iterator[tuple[int, int]]:
-    """The two corners that each of the ten nodes is halfway between; of a corner, twice itself."""
+    """The two corners whose middle is each of the ten nodes; for a corner, the corner twice."""
     nodes = reference_nodes("tetrahedron", 2)
     for weights in np.column_stack([1 - nodes.sum(axis=1), nodes]):
         near = np.flatnonzero(weights)

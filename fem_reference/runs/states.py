@@ -1,4 +1,4 @@
-"""The states of a run as finite elements have them: the unknowns of every tetrahedron, written and read with numpy alone.
+"""The finite element states of a run: the unknowns of every tetrahedron, written and read with numpy alone.
 
 <run>/state/rest.npz          points (n, 3) [mm], tets (m, 4), fibre (m, 3): the unit vector along the fibres, (0, 3) if none
             /frame_0010.npz   the arrays of ``NodalState``
@@ -18,7 +18,7 @@ from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.io.files import whole
 
 FOLDER = "state"
-# The most memory [bytes] that the arrays of a file may take: a state of a million tetrahedra.
+# The most memory [bytes] for the arrays of a file: a state of a million tetrahedra.
 MOST_BYTES = 2**30
 # Arrays by name.
 Arrays = dict[str, NDArray[Any]]
@@ -31,8 +31,8 @@ class NodalState:
     ``body.reference_nodes``; ``pressure`` (m, l) [MPa] at the corners (l = 4 of a tetrahedron), constant in the cell (l = 1),
     or none (l = 0).
 
-    Where an effect feels how fast time passes, also the displacement ``before`` (m, k, 3) [mm] that the last load step started
-    from, and ``rate`` [1/s], one over the time that it took; else (0, 0, 3) and 0.
+    Where an effect depends on velocities, also the displacement ``before`` (m, k, 3) [mm] at the start of the last load step, and
+    the inverse ``rate`` [1/s] of its duration; else (0, 0, 3) and 0.
     """
 
     displacement: Floats
@@ -42,7 +42,7 @@ class NodalState:
 
     @property
     def arrays(self) -> Arrays:
-        """Arrays that are written, by name."""
+        """The arrays to write, by name."""
         return {name: getattr(self, name) for name in _ARRAYS}
 
     @classmethod
@@ -53,12 +53,12 @@ class NodalState:
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """Write what the states of a run are states of.
+    """Write the rest mesh of the states of a run.
 
     Parameters
     ----------
     folder
-        Of the run.
+            Folder of the run.
     mesh
         The tetrahedra at rest.
     fibre
@@ -96,7 +96,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
 
 
 class StoredStates(Mapping[float, NodalState]):
-    """The states of the run in ``folder`` by frame number, read as they are asked for; the last one is kept."""
+    """The states of the run in ``folder`` by frame number, read on demand; the last one is kept in memory."""
 
     def __init__(self, folder: Path, frames: tuple[int, ...]) -> None:
         self.folder, self.frames = folder, frames
@@ -133,7 +133,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def _check_size(file: BinaryIO) -> None:
-    """ValueError where arrays would take more than ``MOST_BYTES`` of memory."""
+    """Raise ValueError where arrays would take more than ``MOST_BYTES`` of memory."""
     with zipfile.ZipFile(file) as members:
         size = sum(member.file_size for member in members.infolist())
     file.seek(0)
@@ -148,5 +148,5 @@ def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
             _check_size(file)
             with np.load(file, allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in names or arrays.files}
-    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
+    except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
         raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error

@@ -1,16 +1,16 @@
-"""Runs: what a solver produced of a problem, in memory and on disk.
+"""Runs: the result of a solver on a problem, in memory and on disk.
 
-    <store>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
-                          /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
-                          /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
-                          /fibres.pvd      fibre polylines, where the solver has an interior
-                          /tets.pvd        tetrahedra, where the solver has them
-                          /field.pvd       a scalar field on its mesh, where that is what is solved (``fields``)
-                          /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
-                          /restart/        of a run that is made or was cut off: what its solver goes on from (``cut_off``)
+        <store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
+                              /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                              /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
+                              /fibres.pvd      fibre polylines, where the solver has an interior
+                              /tets.pvd        tetrahedra, where the solver has them
+                              /field.pvd       a scalar field on its mesh, for a scalar problem (``fields``)
+                              /state/          the unknowns of the tetrahedra, where requested (``states``)
+                              /restart/        of an unfinished run: the state from which its solver continues (``cut_off``)
 
-A file appears whole or not at all; ``run.json`` after the frame files that it names. A run whose status is ``running`` was cut off;
-it is not read as a result, and goes on where its solver can, as one that crashed.
+Files are written atomically; ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
+crashed; it is not read as a result, and continues where its solver can.
 """
 
 from collections.abc import Callable, Collection, Iterable
@@ -38,17 +38,17 @@ from fem_reference.scenes.case import Part
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One requested frame, by its ``number``: what of it a solver has.
+    """One requested frame, by its ``number``, with the parts that the solver has.
 
-    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the vertices of the surface, of the points of the
-    fibres and, (0, 3) without cells, of the nodes of the mesh. ``forces`` (3,) [N] by name of what is prescribed: those of the
-    constraint along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at nodes of several regions that
-    prescribe the same component, the force counts in each); and what obstacles exert. ``state``: the unknowns of the cells, where
-    they were asked for. ``field``: of a scalar problem. ``residuals``: the norms [N, mm3] before and after each of Newton's
-    iterations in the last load step to it. ``note``: what progress says of the frame.
+    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the surface's vertices, of the fibres' points
+    and, (0, 3) without cells, of the mesh's nodes. ``forces`` (3,) [N] by name of each constraint, along its prescribed
+    components, and their ``moments`` (3,) [N mm] about the origin (at nodes of several regions that prescribe the same component,
+    the force counts in each); also those of obstacles. ``state``: the unknowns of the cells, where requested. ``field``: of a
+    scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
+    ``note``: the text that progress shows for the frame.
 
-    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside,
-    newton_iterations, cut_backs. Of the reference besides, where all energy is stored, energy_gap since the frame before
+    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm],
+    newton_iterations, cut_backs. Of the reference also, where all energy is stored, energy_gap since the last frame
     (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoid leaves much); where the tangent is symmetric,
     negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
     max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
@@ -70,8 +70,8 @@ class Frame:
 
     @classmethod
     def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
-        """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if it has
-        any, as :class:`NodalField` has them.
+        """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if any, as in
+        :class:`NodalField`.
         """
         more = {} if components is None else {"components": components}
         return cls(problem.frames[0], field=NodalField(problem.mesh, {fields.VALUES: values} | more, form))
@@ -82,7 +82,7 @@ Sink = Callable[[Frame], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a solve: a status, a sentence for people, and what it cost (seconds by phase ``seconds_...``, counts)."""
+    """The end of a solve: a status, a sentence for people, and the cost (seconds by phase ``seconds_...``, counts)."""
 
     status: Status
     message: str
@@ -91,14 +91,14 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Frames that somebody's solver produced of a problem: the muscle or the scalar field of a case, or a body.
+    """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
 
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
     (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
-    alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` in their
-    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them. ``states``: the frames in full, of a run
-    that is not stored, all that there is of one of a body. ``body`` and ``settings``: what was solved how, where error bars of a
-    body may be asked for. ``residuals`` by frame.
+    only moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead,
+    and ``fields`` by name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a
+    body they are the whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested.
+    ``residuals`` by frame.
     """
 
     name: str
@@ -122,14 +122,14 @@ class Run:
 
     @property
     def last(self) -> Frame:
-        """The last frame of a run in memory; ArithmeticError with the reason where not all were reached."""
+        """The last frame of a run in memory; ArithmeticError with the reason where some were not reached."""
         if self.outcome.status != "converged":
             raise ArithmeticError(f"{self.outcome.status}: {self.outcome.message}")
         return self.states[-1]
 
     @property
     def carries(self) -> frozenset[Part]:
-        """Parts that can be measured."""
+        """The parts that can be measured."""
         if self.mesh is not None:
             return frozenset({"field"})
         if self.has_surface:
@@ -138,12 +138,12 @@ class Run:
 
     @property
     def points(self) -> Floats:
-        """The vertices (n, d) that a field is on, else those of the surface at rest (n, 3) [mm]."""
+        """The vertices (n, d) of a field, else those of the surface at rest (n, 3) [mm]."""
         return self.surface.points if self.mesh is None else self.mesh.points
 
     @property
     def values(self) -> Floats:
-        """The scalar field at all nodes (f, N); KeyError of a run that has none."""
+        """The scalar field at all nodes (f, N); KeyError for a run without one."""
         return self.fields[fields.VALUES]
 
     @property
@@ -152,7 +152,7 @@ class Run:
         return self.values[:, : len(self.points)]
 
     def _repr_html_(self) -> str:
-        """The run as notebooks show it."""
+        """The run as notebooks display it."""
         known = ("seconds", "newton_iterations", "unknowns")
         cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {
@@ -167,7 +167,7 @@ class Run:
 
 
 def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:
-    """The run in memory of ``frames``, with arrays of what all of them have; ``rest``: the shapes that they move."""
+    """The run in memory with ``frames``; its arrays are those that all frames have. ``rest``: the shapes that they move."""
     states = tuple(frames)
 
     def stacked(name: str) -> Floats | None:
@@ -216,7 +216,7 @@ def load(folder: Path) -> Run:
 
 
 def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:
-    """The surface and the fibres of a run in ``folder``, at rest and moved, as :class:`Run` has them."""
+    """The surface and the fibres of a run in ``folder``, at rest and moved, as in :class:`Run`."""
     names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
     if has_surface:
         surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
@@ -237,14 +237,14 @@ def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> di
 
 
 def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floats) -> None:
-    """InputError where a frame has another number of points than the run has at rest."""
+    """Raise InputError where a frame has another number of points than the run at rest."""
     for name, points in zip(names, frames, strict=True):
         if len(points) != len(rest):
             raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as the rest of the run has")
 
 
 def status(folder: Path) -> str:
-    """The status in the ``run.json`` of a run in ``folder``: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
+    """The status in the ``run.json`` of a run in ``folder``; ``"running"`` where it was cut off, or ``"damaged"``."""
     try:
         return str(texts.read_json(folder / "run.json", "a run")["status"])
     except (InputError, KeyError, TypeError):
@@ -252,7 +252,7 @@ def status(folder: Path) -> str:
 
 
 def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | None:
-    """The stored run in ``folder`` if it is there and ``ended`` so, else None."""
+    """The stored run in ``folder`` if there is one whose status is in ``ended``, else None."""
     try:
         run = load(folder)
     except InputError:

@@ -1,7 +1,7 @@
-"""Runs on disk while they are made: each frame is written as it is reached.
+"""Runs written to disk while they are solved, frame by frame.
 
-A file appears whole or not at all; ``run.json`` after the frame files that it names. A run whose status is ``running`` was cut off;
-it is not read as a result, and goes on where its solver can, as one that crashed.
+Files are written atomically; ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
+crashed; it is not read as a result, and continues where its solver can.
 """
 
 import json
@@ -22,13 +22,13 @@ from fem_reference.runs.store import Frame, Outcome
 
 log = logging.getLogger(__name__)
 
-# Between the first and the last frame, progress is reported no more often than this [s].
+# Between the first and the last frame, progress is reported at most once in this time [s].
 QUIET = 1.0
 
 
 class Writer:
-    """Writes one run into ``folder``, which it empties first but for a run that was cut off and can go on; ``add`` each frame, then
-    ``close``. A frame that is stored already takes the place of the stored one and of all after it.
+    """Writes one run into ``folder``. It first empties the folder, except for a run that was cut off and can continue. ``add``
+    each frame, then ``close``. A frame that is already stored replaces the stored one and all after it.
     """
 
     def __init__(
@@ -37,8 +37,8 @@ class Writer:
         identity: dict[str, Any],
         rest: AtRest = NOTHING,
     ) -> None:
-        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json; ``rest``:
-        the shapes that its frames move.
+        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the requested numbers), as in run.json; ``rest``: the
+        shapes that its frames move.
         """
         self.folder, self.rest = folder, rest
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
@@ -53,12 +53,12 @@ class Writer:
 
     @property
     def cut_off(self) -> CutOff:
-        """The part that is stored so far, for a solver that can go on."""
+        """The stored part, for a solver that can continue."""
         return CutOff(self.folder / cut_off.FOLDER, self.frames)
 
     @property
     def frames(self) -> tuple[int, ...]:
-        """The numbers of those stored so far."""
+        """The numbers of the stored frames."""
         return tuple(self.state["numbers"])
 
     def add(self, frame: Frame) -> None:
@@ -88,13 +88,13 @@ class Writer:
             names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
-            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # of effects that were added since
+            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # for effects added since
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)
 
     def close(self, outcome: Outcome, **origin: Any) -> None:
-        """Store how it ended, and what more is known of its ``origin`` now."""
+        """Store the outcome, and further facts on the ``origin``."""
         self.state["origin"] |= origin
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
@@ -112,7 +112,7 @@ class Writer:
         return True
 
     def _write_rest(self) -> None:
-        """The rest state, which the first frame of a solver without a surface is not."""
+        """Write the rest state, which is not the first frame of a solver without a surface."""
         (self.folder / "rest").mkdir(exist_ok=True)
         surface, fibres = self.rest.surface, self.rest.fibres
         files.write_surface(self.folder / "rest" / "surface.vtp", surface, surface.points)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import shapes
 import small
 import stand_ins
 from acting import PARAMETERS
+from auto_scenes import pennate
 
 from fem_reference.effects import make
 from fem_reference.foundations.motion import Rotation, Translation
@@ -117,3 +119,23 @@ def test_what_a_stored_run_shows_in_one_frame_in_the_middle_is_seen(
         bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
     assert "Contact: needed as it turned out at frame 10" in caplog.text
+
+
+def test_bones_that_turn_together_bend_nothing(tmp_path) -> None:
+    rest, turned = muscle.setup(pennate(tmp_path / "scene", "auto")), np.eye(4)
+    turned[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    for first, angle in ((turned, 0.0), (np.eye(4), np.pi / 2)):
+        bones = [
+            replace(rest.bones[i], motion=SimpleNamespace(pose=lambda _, pose=pose: pose))
+            for i, pose in enumerate((first, turned))
+        ]
+        attached = tuple(replace(entry, bone=bone) for entry, bone in zip(rest.attached, bones, strict=True))
+        assert guess.turn(replace(rest, attached=attached), 1) == pytest.approx(angle, abs=1e-12)
+
+
+def test_a_strain_is_what_no_rigid_motion_makes() -> None:
+    points = shapes.box((2, 2, 8), (10, 10, 40)).points
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    assert guess.strain(points, points @ turn.T + [3, -2, 70]) == pytest.approx(0, abs=1e-12)
+    assert guess.strain(points, 1.1 * points @ turn.T) == pytest.approx(0.1)
+    assert guess.strain(points, 5 * points) == 1

@@ -1,4 +1,4 @@
-"""Scene -> problem: what is attached, what the mesh is like, and fibres that stay where the solution is."""
+"""Case -> problem: what is attached, what the mesh is like, and what does not depend on it."""
 
 from dataclasses import replace
 
@@ -7,14 +7,12 @@ import pytest
 import small
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines, boundary, check_closed, enclosed_volume
+from fem_reference.foundations.mesh import boundary, enclosed_volume
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.rigid_bodies import Box, HalfSpace
 from fem_reference.geometry.skins import Skin
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
-from fem_reference.problems import fibre_field, muscle
-from fem_reference.report.overview import case_facts
+from fem_reference.problems import muscle
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -28,11 +26,6 @@ def build(case):
 
 def build_scene(scene):
     return muscle.build(scene, muscle.setup(scene))
-
-
-@pytest.fixture(scope="module")
-def bar(tmp_path_factory):
-    return small.write(tmp_path_factory.mktemp("problem") / "bar")
 
 
 @pytest.fixture(scope="module")
@@ -82,21 +75,6 @@ def test_mesh_facts_say_who_made_it_and_how_good_it_is(built) -> None:
     assert facts["volume_mm3"] == pytest.approx(enclosed_volume(body.points, body.triangles), rel=1e-3)
 
 
-def test_a_body_rests_where_it_has_no_motion(built) -> None:
-    floor, lid = built.bones
-    assert np.array_equal(floor.pose(7), np.eye(4))
-    assert not np.array_equal(lid.pose(7), np.eye(4))
-
-
-def test_given_fibres_stay_inside_the_muscle(built) -> None:
-    inside, far = [5.0, 5.0, 20.0], [5.0, 30.0, 20.0]
-    given = Polylines(np.array([inside, far]), np.array([0, 2]))
-    moved = fibre_field.inside(built.surface, given)
-    assert np.array_equal(moved.points[0], inside)
-    # The nearest point of the side, which bulges to y = 5 + 5 * 1.3 = 11.5 halfway up.
-    assert moved.points[1] == pytest.approx([5, 11.5, 20], abs=1e-9)
-
-
 def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
     text = (bar / "case.toml").read_text()
     (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}{CONTACT}\n[fibres]"))
@@ -117,19 +95,6 @@ def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
     for mine, theirs in ((one.skin, other.skin), (one.attached_skins["insertion"], other.attached_skins["insertion"])):
         assert np.array_equal(mine.points, theirs.points)
         assert np.array_equal(mine.areas, theirs.areas)
-
-
-def test_given_fibres_are_read(bar) -> None:
-    lines = Polylines(np.array([[5.0, 5, 2], [5, 5, 20], [5, 5, 38]]), np.array([0, 3]))
-    files.write_polylines(bar / "lines.vtp", lines, lines.points)
-    text = (bar / "case.toml").read_text()
-    traced = 'traced = { count = 4, start = "origin", end = "insertion" }'
-    assert traced in text
-    (bar / "case.toml").write_text(text.replace(traced, 'polylines = { file = "lines.vtp", unit = "mm" }'))
-    try:
-        assert build(bar).fibres.lengths().tolist() == [36]
-    finally:
-        (bar / "case.toml").write_text(text)
 
 
 def test_a_vertex_has_one_bone(bar) -> None:
@@ -202,87 +167,6 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     assert set(body.mesh.facets) == {"origin", "insertion", "free"}
 
 
-SQUEEZED = """
-title = "A box between plates"
-proves = "that bones may have a closed form and no attachment"
-fibres.polylines = { file = "mesh:box/fibres.vtk", unit = "mm" }
-
-[muscle]
-surface = "mesh:box/box.ply"
-unit = "mm"
-tet_size = "20 mm"
-mesher = "block"
-
-[[bone]]
-name = "floor"
-half_space = { point = "0, 10, 0 mm", normal = [0, 1, 0] }
-
-[[bone]]
-name = "lid"
-box = { centre = "0, 140, 0 mm", size = "400, 100, 400 mm" }
-motion.direction = [0, -1, 0]
-motion.keyframes = [{ frame = 0, distance = "0 mm" }, { frame = 100, distance = "40 mm" }]
-
-[[effect]]
-name = "neo_hooke"
-mu = "10 kPa"
-
-[[effect]]
-name = "incompressible"
-bulk = "1 MPa"
-
-[[effect]]
-name = "contact"
-stiffness = "1 MPa/mm"
-
-[[effect]]
-name = "damping"
-coefficient = "1 Pa s/mm^2"
-
-[frames]
-first = 0
-last = 100
-every = 50
-interval = "1 s"
-
-[reference]
-solver = "fenicsx"
-
-[[expect]]
-of = "reference"
-metric = "volume"
-statistic = "deviation"
-frame = "any"
-truth = "0 %"
-within = "90 %"
-kind = "property"
-because = "it is a body"
-
-[negative_control]
-key = "effect[0].mu"
-value = "9 kPa"
-because = "it is softer"
-"""
-
-
-@pytest.fixture(scope="module")
-def squeezed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("problem") / "squeezed"
-    folder.mkdir()
-    (folder / "case.toml").write_text(SQUEEZED)
-    return casefile.read(folder)
-
-
-def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
-    floor, lid = muscle.setup(squeezed).bones
-    assert floor.shape == floor.solid == HalfSpace((0, 10, 0), (0, 1, 0))
-    assert lid.shape == lid.solid == Box((0, 140, 0), (400, 100, 400), 0)
-    for bone in (floor, lid):
-        assert check_closed(bone.surface) is bone.surface
-    assert lid.pose(50) == pytest.approx(np.array([[1, 0, 0, 0], [0, 1, 0, -20], [0, 0, 1, 0], [0, 0, 0, 1]]))
-    assert np.array_equal(floor.pose(50), np.eye(4))
-
-
 def test_a_body_may_be_attached_by_nothing(squeezed) -> None:
     built = build_scene(squeezed)
     assert built.attached == ()
@@ -307,19 +191,6 @@ def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
     scene = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"mesher": "block"})})
     with pytest.raises(InputError, match=r"case.toml: muscle.surface: .*bar.vtp: got \d+ triangles in no face"):
         build_scene(scene)
-
-
-def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
-    facts = case_facts(squeezed, muscle.setup(squeezed))
-    assert facts["muscle"]["mesher"] == "block"
-    assert facts["attachments"] == {}
-    assert facts["bones"] == {
-        "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, rests",
-        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0), "
-        "mm at frame: 0 at 0, 40 at 100",
-    }
-    turning = casefile.read(bar)
-    assert "turns about (5, 5, 30) mm along" in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
 def test_a_frame_of_a_body_attached_by_nothing_states_nothing_of_attachments(squeezed) -> None:

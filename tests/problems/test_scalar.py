@@ -50,15 +50,6 @@ def test_bounds_go_along_the_rim_when_the_mesh_is_refined(tmp_path) -> None:
     assert problem.fixed == pytest.approx(np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan), nan_ok=True)
 
 
-def test_nodes_at_random_are_those_of_the_seed(tmp_path) -> None:
-    drawn = [scene(tmp_path, domain={"interval": INTERVAL["interval"] | {"seed": seed}}) for seed in (1, 1, 2)]
-    one, again, other = (build(entry).mesh.points[:, 0] for entry in drawn)
-    assert (one == again).all()
-    assert (one != other).any()
-    assert (one[0], one[-1], len(one)) == (0, 1, 5)
-    assert (np.diff(one) > 0).all()
-
-
 def test_the_shipped_plates_are_the_report_s() -> None:
     # Listing 4.3 on the square of listing 4.5, and eq. 4.11; Octave's linspace and cosine round otherwise in the last place.
     square, bounds = octave_points.square()
@@ -134,20 +125,6 @@ def test_tables_that_are_not_usable(tmp_path, name, text, match) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=match):
         build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}, {"bounds": "more.csv"}]))
-
-
-@pytest.mark.parametrize(
-    ("points", "match"),
-    [
-        ("0,0\n1,1\n2,2\n", "points that cannot be triangulated"),
-        ("0,0,0\n1,0,0\n0,1,0\n", '"delaunay" of points in space'),
-    ],
-)
-def test_points_that_delaunay_cannot_do(tmp_path, points, match) -> None:
-    (tmp_path / "points.csv").write_text(points)
-    domain = {"mesh": {"points": "points.csv", "triangles": "delaunay"}}
-    with pytest.raises(InputError, match=match):
-        build(scene(tmp_path, domain=domain, boundary=[{"on": "rim", "value": 0}]))
 
 
 def test_the_listings_refuse_what_they_do_not_have(tmp_path) -> None:

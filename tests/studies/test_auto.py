@@ -1,4 +1,4 @@
-"""``effects = "auto"``: which effects a scene needs is found out before it is solved, and looked at again after."""
+"""``effects = "auto"``: indicators of effects, and runs to which what turns out to matter is added while they are made."""
 
 import importlib.util
 from dataclasses import replace
@@ -9,12 +9,12 @@ import pytest
 import small
 import stand_ins
 from acting import PARAMETERS
+from auto_scenes import CONTACT, WEIGHT, scene_of
 
 from fem_reference import cli, effects
 from fem_reference.effects import make
 from fem_reference.foundations.indicators import Estimates, Near
-from fem_reference.problems import estimates, muscle, of_case
-from fem_reference.report.sections import origin
+from fem_reference.problems import estimates
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -42,15 +42,7 @@ SCENE = Estimates(
 )
 # Of these a scene may do without; all others are the material.
 CHOSEN = [name for name in effects.names(effects.Effect) if make(name, **PARAMETERS[name]).indicator(SCENE)]
-CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 BACK = '{ frame = 0, angle = "0 rad" }, { frame = 5, angle = "-0.2 rad" }'
-WEIGHT = """
-[[effect]]
-name = "gravity"
-density = "{density} kg/m3"
-acceleration = "0, 0, -9.81 m/s^2"
-ramp = [{{ frame = 0, amount = 0.0 }}, {{ frame = 5, amount = 1.0 }}]
-"""
 
 
 def test_what_loads_comes_and_goes_or_takes_time_can_be_left_out() -> None:
@@ -108,63 +100,11 @@ def test_what_nothing_fixes_keeps_its_weight_and_its_drag() -> None:
         assert little.indicator(SCENE).estimate < SCENE.tolerance < little.indicator(loose).estimate
 
 
-def test_a_body_that_is_attached_to_nothing_goes_with_the_bones_beside_it(tmp_path) -> None:
-    scene = scene_of(tmp_path, "")
-    loose = replace(muscle.setup(scene), attached=())
-    known = estimates.estimates(scene, loose)
-    assert known.fixed == 0
-    assert known.travel > 1
-    assert known.speed > 0
-
-
-def test_small_motions_are_asked_for_more_closely(tmp_path) -> None:
-    scene = scene_of(tmp_path, "")
-    rest = muscle.setup(scene)
-    known, slow = estimates.estimates(scene, rest), estimates.TOLERANCE * scene.muscle.tet_size
-    assert known.tolerance == pytest.approx(min(slow, estimates.TOLERANCE * known.travel))
-    bones = tuple(replace(bone, motion=None) for bone in rest.bones)
-    still = replace(rest, bones=bones, attached=tuple(replace(one, bone=bones[0]) for one in rest.attached))
-    assert estimates.estimates(scene, still).tolerance == pytest.approx(slow)
-
-
-def scene_of(folder: Path, more: str, choice: str = "auto"):
-    case = small.write(folder / "bar")
-    path = case / "case.toml"
-    path.write_text(f'effects = "{choice}"\n{path.read_text()}{more}')
-    return casefile.read_muscle(case)
-
-
-def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
-    light, heavy = (scene_of(tmp_path / text, WEIGHT.format(density=text)) for text in ("0.001", "100000"))
-    kept = [of_case.chosen(one) for one in (light, heavy)]
-    assert [len(one.effects) for one in kept] == [2, 3]
-    assert [len(one.decisions) for one in kept] == [3, 3]
-    listed = scene_of(tmp_path / "listed", "", "listed")
-    assert kept[0].key == listed.key
-    assert of_case.chosen(kept[0]) is kept[0]
-    assert of_case.chosen(listed) is listed
-    assert origin.changes(kept[0]) == [], "what it chose is no change of its file"
-    assert "Gravity: left out" in str(kept[0].decisions[2])
-    assert "Gravity: needed" in str(kept[1].decisions[2])
-    assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
-
-
 def test_explain_says_so_before_anything_is_solved(tmp_path, capsys) -> None:
     scene = scene_of(tmp_path, WEIGHT.format(density="0.001"))
     assert cli.main(["run", str(scene.folder), "--explain", "--out", str(tmp_path / "out")]) == cli.DONE
     assert "Gravity: left out, about" in capsys.readouterr().out
     assert not (tmp_path / "out").exists()
-
-
-def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:
-    """A third bone beside the bar, which rests: 1.5 mm from where that goes, and 600 mm."""
-    found = []
-    for away in (1.5, 600.0):
-        ball = f'\n[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {-away - 20}, 36 mm", radius = "20 mm" }}\n'
-        scene = scene_of(tmp_path / f"{away:g}", ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'))
-        found.append(of_case.chosen(scene).decisions[-1])
-    assert [one.needed for one in found] == [True, False]
-    assert found[1].indicator.estimate == 0
 
 
 def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, caplog) -> None:
@@ -201,43 +141,6 @@ def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, capl
         again = Bench(scene, tmp_path / "runs")
     assert again.obtain("reference", scene.reference, "reference").folder == run.folder
     assert len(solved) == 2, "what was stopped is not solved again"
-
-
-def test_the_estimates_of_a_bar_are_what_is_known_of_it(tmp_path) -> None:
-    scene = scene_of(tmp_path, "")
-    known = estimates.estimates(scene, muscle.setup(scene))
-    assert known.shear == pytest.approx(0.01, rel=1e-5)  # mu = 10 kPa; small strain
-    low, high = known.stretch
-    assert low < 1 < high
-    assert known.acceleration >= 0
-    assert known.jump > 0  # keyframes are joined by straight lines
-
-
-def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(tmp_path) -> None:
-    """The bar, made longer by a fifth along its axis, thinner, and turned."""
-    scene = scene_of(tmp_path, "")
-    rest = muscle.setup(scene)
-    first, last = (rest.surface.points[entry.vertices].mean(axis=0) for entry in rest.attached)
-    axis = (last - first) / np.linalg.norm(last - first)
-    stretched = np.outer(axis, axis) * 1.2 + (np.eye(3) - np.outer(axis, axis)) * 1.2**-0.5
-    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    low, high = estimates.stretched(rest, rest.surface.points @ (turn @ stretched).T)
-    # Triangles whose plane is off the axis by the slope of the bar, up to a few per cent, mix in what is thinner, to second order.
-    assert high == pytest.approx(1.2, abs=1e-3)
-    assert low > 1.1
-    assert estimates.stretched(rest, rest.surface.points) == pytest.approx((1, 1))
-
-
-def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
-    """They are slack up to more than is guessed of the turn, and the run stretched them by more than that."""
-    scene = of_case.chosen(scene_of(tmp_path, small.FIBRES.format(slack=1.3)))
-    rest = muscle.setup(scene)
-    assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
-    still, longer = rest.surface.points, rest.surface.points * 1.6
-    watch = of_case.watch(scene, rest, lambda: None)
-    assert watch.see(0, still, None) == ()
-    (late,) = watch.see(10, longer, None)
-    assert "FibrePassive: needed as it turned out at frame 10" in str(late)
 
 
 def added_later(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str, blind: str, unseen: object):

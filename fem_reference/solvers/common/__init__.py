@@ -1,1 +1,1 @@
-"""Shared by solvers: what a solver is, the loop over frames, load steps, checks of states."""
+"""Code shared by solvers: the solver protocol, the loop over frames, load steps, checks of states."""

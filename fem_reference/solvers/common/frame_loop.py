@@ -1,4 +1,4 @@
-"""The loop over frame numbers that the fast solvers share, and surfaces that go along with their bones."""
+"""The loop over frame numbers of the fast solvers, and surfaces attached to moving bones."""
 
 import math
 import time
@@ -18,14 +18,14 @@ from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble, surface_checks
 
-# Parts of a frame in which motions are looked at; what is seen in these is seen in more.
+# Fractions of a frame at which motions are sampled; a bone that turns too far between these also does between finer ones.
 _PARTS = 16
-# Positions (n, 3) [mm], what is kept of their velocities (n, 3), and the frame number -> both after its iteration.
+# Positions (n, 3) [mm], the stored part of their velocities (n, 3), and the frame number -> both after its iteration.
 Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 
 
 class FrameModel(Protocol):
-    """A muscle that goes from frame number to frame number."""
+    """A model of a muscle that advances from frame number to frame number."""
 
     @property
     def cost(self) -> dict[str, float]:
@@ -33,16 +33,16 @@ class FrameModel(Protocol):
 
     @property
     def advice(self) -> str:
-        """Advice where a run ends in trouble."""
+        """Advice for a run that ends in trouble."""
 
     def move(self, number: int, /) -> None:
-        """Go to the frame ``number``: what this takes is the time of solving."""
+        """Advance to the frame ``number``; the time of this counts as solving."""
 
     def trouble(self) -> Trouble | None:
         """The trouble with the present state; None without."""
 
     def frame(self, number: int, /) -> Frame:
-        """The present state, which is that of the frame ``number``."""
+        """The present state, that of the frame ``number``."""
 
     def ending(self) -> Outcome:
         """The outcome of a run that reached every frame."""
@@ -50,7 +50,7 @@ class FrameModel(Protocol):
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
     """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
-    parts at whose ends it sees where bones are; ``sink`` gets the frames. Out of steps where bones do what nobody sees in between.
+    parts; the model sees the bones at their ends. ``sink`` gets the frames. *Out of steps* where bones move too far in between.
     """
     frames = setup.frames
     if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
@@ -60,14 +60,14 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Trouble with a bone that turns too far from where it is seen to where it is seen next, or there and back; None without."""
+    """Trouble with a bone that turns too far between two samples of its pose, or there and back; None without."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
     seen = np.linspace(setup.frames[0], setup.frames[-1], count + 1)
     bones = [
         bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()
-    ]  # else its loop says so
+    ]  # the loop reports the others
     things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
     found = skipped(things, seen.tolist(), diagonal(points))
     if found is None:
@@ -81,12 +81,12 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
 
 
 def each(model: FrameModel, frames: tuple[int, ...], sink: Sink) -> Outcome:
-    """Take ``model``, whose states do not depend on those before, to ``frames`` alone, the first like all others."""
+    """Take ``model``, whose states do not depend on earlier ones, to ``frames`` only, the first like all others."""
     return _go(model, frames, frames, sink)
 
 
 def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
-    """A loop that is not begun, and ``why``; ``sink`` gets the ``first`` frame, which is rest."""
+    """The outcome of a loop that does not start, with the reason ``why``; ``sink`` gets the ``first`` frame, which is rest."""
     sink(model.frame(first))
     return Outcome(why.status, why.sentence, _begun(model))
 
@@ -114,8 +114,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
 
 
 def timed[M: FrameModel](make: Callable[[Setup], M], setup: Setup) -> M:
-    """The model that ``make`` makes of ``setup``. Its cost says in which ``seconds_setup``; and in which ``seconds_compile`` one
-    frame of a tetrahedron was solved before, for which every compiled function is called.
+    """The model that ``make`` builds from ``setup``, with its ``seconds_setup`` in the cost. First it solves one frame of a
+    tetrahedron, which calls every compiled function, in ``seconds_compile``.
     """
     begin = time.perf_counter()
     first = make(tetrahedron())
@@ -143,8 +143,8 @@ def tetrahedron() -> MuscleProblem:
 
 @dataclass(eq=False)
 class MovingSurface:
-    """A muscle that is its surface of particles, taken along by ``iterate``, which projects so many constraints (``projections``,
-    those of contact not counted): a model of the loop.
+    """A surface of particles as the model of a muscle, advanced by ``iterate``. An iteration projects ``projections``
+    constraints, those of contact not counted.
     """
 
     setup: Setup
@@ -162,7 +162,7 @@ class MovingSurface:
         self.cost |= {"unknowns": 3.0 * free, "projections": 0.0}
 
     def move(self, number: int) -> None:
-        """Iterate once."""
+        """Run one iteration."""
         self.points, self.kept = self.iterate(self.points, self.kept, number)
         self.cost["projections"] += self.projections
 
@@ -179,18 +179,18 @@ class MovingSurface:
         return Frame(number, self.points.copy())
 
     def ending(self) -> Outcome:
-        """Converged, as every iteration is."""
+        """Converged: every iteration counts as such."""
         return Outcome("converged", f"{self.setup.frames[-1] - self.setup.frames[0]} iterations")
 
 
 def carry(points: Floats, setup: Setup, frame: float) -> None:
-    """Put the attached vertices where their bones are at ``frame``."""
+    """Move the attached vertices with their bones to ``frame``."""
     for entry in setup.attached:
         points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
 def other_clock(setup: Setup, frame_time: float) -> str:
-    """A note where the scene has an interval [s] other than a solver's ``frame_time`` [s]; empty where it has not."""
+    """A note where the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
     return f"; from a frame number to the next it takes {frame_time:g} s, the scene {setup.interval:g} s"

@@ -13,8 +13,8 @@ GROWTH = 1.5
 
 @dataclass(frozen=True)
 class Attempt:
-    """The record of a solve at one load by Newton's method: its ``status``, the one that it would end the run with where it failed;
-    the ``iterations``; the norms of the ``residuals`` [N, mm3] before the first of them and after each; and, of a failure, a
+    """The record of a Newton solve at one load: its ``status``, which ends the run if the solve failed; the number of
+    ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each; and, of a failure, a
     ``detail``: a sentence that begins with its subject.
     """
 
@@ -25,18 +25,18 @@ class Attempt:
 
     @property
     def converged(self) -> bool:
-        """A state in equilibrium was found, and no check refused it."""
+        """True where a state in equilibrium was found and no check refused it."""
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """The attempt, which converged, to a state that a check refuses."""
+        """The attempt, which converged, as a failure because a check refuses its state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
 @dataclass(frozen=True)
 class Step:
-    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. The ``last`` attempt says how
-    it ended, and the last good state is ``at`` a frame; ``size``: of the load step that comes next.
+    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. The ``last`` attempt
+    describes how it ended; the last good state is ``at`` a frame; ``size`` is that of the next load step.
     """
 
     frame: float
@@ -50,7 +50,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StepSizes:
-    """The ``first`` load step, and between which sizes they may be, in frame numbers; one ends at each of ``stops``, in order."""
+    """The ``first`` load step, and its least and greatest size, in frame numbers; a step ends at each of ``stops``, in order."""
 
     first: float
     smallest: float
@@ -58,7 +58,7 @@ class StepSizes:
     stops: tuple[float, ...] = ()
 
     def goals(self, at: float, frame: float) -> tuple[float, ...]:
-        """The stops on the way from ``at`` to a ``frame``, and this."""
+        """The stops between ``at`` and a ``frame``, and the frame itself."""
         near = 1e-9 * max(1.0, abs(at), abs(frame))
         return (*(stop for stop in self.stops if at + near < stop < frame - near), float(frame))
 
@@ -70,10 +70,10 @@ def march(
     recall: Callable[[float], bool] = lambda _: False,
     last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
-    """Go from ``frames[0]`` (where the body rests, or goes on) through every frame; ``attempt`` solves at a load, from the last
-    state that converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before
-    needs no step. Before it is given up ``last_resort`` is asked for another way to solve: where it says that there is one, load
-    steps begin anew. Ends after the first frame that cannot be reached.
+    """Go from ``frames[0]`` (at rest, or where the run continues) through every frame. ``attempt`` solves at a load from the last
+    converged state, and must restore that state where it fails. A frame whose earlier state ``recall`` can take up needs no step.
+    Before giving up, the loop asks ``last_resort`` for another way to solve; where it returns True, load steps begin anew.
+    Ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -104,5 +104,5 @@ def march(
 
 
 def _size(left: float, step: float, largest: float) -> float:
-    """The size of a load step near to ``step``, of equal ones over what is ``left``: none is a sliver."""
+    """The size of equal load steps over ``left``, near to ``step``: none is a sliver."""
     return left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))

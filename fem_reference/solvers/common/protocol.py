@@ -1,4 +1,4 @@
-"""Solvers: the calls that they answer, and the records with which their files offer these."""
+"""Solver protocol: the calls that solvers answer, and the records in which their files offer them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,20 +17,20 @@ Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
 class Solve[P, S: Record](Protocol):
-    """Solves problems of a kind."""
+    """Solves problems of one type."""
 
     def __call__(self, problem: P, settings: S, sink: Sink, /) -> Outcome:
-        """Sink every requested frame as it is reached. Physics that fails is a status with a sentence and never an exception;
-        what was reached before stays. A scalar field is one frame, not-a-number where the status says that it failed.
+        """Sink every requested frame as it is reached. A physical failure is a status with a sentence, never an exception;
+        earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
         """
 
 
 class GoOn[P, S: Record](Protocol):
-    """Solves problems from where a run was cut off."""
+    """Continues problems from the frame at which a run was cut off."""
 
     def __call__(self, problem: P, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
-        """Solve as ``Solve`` does, from the last stored frame that the solver kept enough of, which need not be the last of all,
-        else from the first; it ends as the run would have ended.
+        """Solve as ``Solve`` does, from the last stored frame with enough state, which need not be the last of all, else from the
+        first; it ends as the run would have ended.
         """
 
 
@@ -38,18 +38,20 @@ class CheckEffects[S: Record](Protocol):
     """Checks settings against effects."""
 
     def __call__(self, settings: S, effects: tuple[Effect, ...], place: str, /) -> None:
-        """InputError below ``place`` where the settings do not suit the effects of a scene."""
+        """Raise InputError below ``place`` where the settings do not suit the effects of a scene."""
 
 
 class CheckProblem[S: Record](Protocol):
-    """Checks settings against what is made of a case."""
+    """Checks settings against the problem of a case."""
 
     def __call__(self, settings: S, problem: Any, place: str, /) -> None:
-        """InputError below ``place`` where the settings do not suit the bones, attachments, fibres or boundary of a case."""
+        """Raise InputError below ``place`` where the settings do not suit the bones, attachments, fibres or boundary of a
+        case.
+        """
 
 
 def _nothing(_: Record) -> None:
-    """Nothing but what this package needs itself."""
+    """Require nothing beyond this package."""
 
 
 def _none(_: Record) -> bool:
@@ -58,8 +60,8 @@ def _none(_: Record) -> bool:
 
 
 class TableRow(NamedTuple):
-    """A row of the page table-5-1: a solver as ``name`` among those of a ``kind`` of the report's Table 5.1, with the same
-    ``settings`` on every scene, as scene files write them.
+    """A row of the page table-5-1: a solver, as ``name`` within a ``kind`` of the report's Table 5.1, with the same ``settings``
+    on every scene, as scene files write them.
     """
 
     kind: str
@@ -69,12 +71,12 @@ class TableRow(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Solver[P, S: Record]:
-    """An offer of a solver's file for one task: ``solve``.
+    """The record in which a solver's file offers ``solve`` for one task.
 
-    ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
-    with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
-    settings speak of what a case has. ``slow``: it takes more than a few seconds on a small problem. ``go_on`` of one
-    that takes long: any other begins again from rest. ``table``: its rows of the page table-5-1.
+    ``settings``: the record of its settings. ``example``: some of them, as scene files write them, for contract tests.
+    ``require``: raises MissingSoftware where software for such settings is not installed. ``check_problem``: for settings that
+    refer to the contents of a case. ``slow``: it takes more than a few seconds on a small problem. ``go_on``: for solvers that
+    take long; all others begin again from rest. ``table``: its rows of the page table-5-1.
     """
 
     task: ClassVar[Task]
@@ -90,7 +92,7 @@ class Solver[P, S: Record]:
     go_on: GoOn[P, S] | None = None
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
-        """True where it needs the problem meshed."""
+        """True where it needs a meshed problem."""
         return True
 
     def run(self, problem: P, settings: S) -> Run:
@@ -100,9 +102,9 @@ class Solver[P, S: Record]:
 
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
-    """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
-    ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
-    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.
+    """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``:
+    for a solver that simulates the effects of a scene, else None; ``fibres``: True where a surface solver needs fibres under such
+    settings. Without them it receives a ``Setup``, as the muscle is not filled for it.
     """
 
     task = "solve"
@@ -145,15 +147,15 @@ def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:
 
 @dataclass(frozen=True)
 class Trade:
-    """Marks a key of settings that buys accuracy with time: a ``ladder`` of values worth a look, as scene files write them, from
-    the fastest to the most accurate. Some may be refused: elements for other cells or other effects.
+    """Marks a settings key that trades time for accuracy: a ``ladder`` of useful values, as scene files write them, from the
+    fastest to the most accurate. Some may be refused: elements for other cells or other effects.
     """
 
     ladder: tuple[float | str, ...]
 
 
 def trades(settings: type[Record]) -> dict[str, tuple[float | str, ...]]:
-    """The keys of ``settings`` that buy accuracy with time, each with its ladder."""
+    """The keys of ``settings`` that trade time for accuracy, each with its ladder."""
     return {
         key: entry.ladder
         for key, field in settings.model_fields.items()

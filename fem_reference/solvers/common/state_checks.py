@@ -1,4 +1,4 @@
-"""Checks that a state is one a body can be in, asked one after the other: the first that finds trouble ends it."""
+"""Checks that a body can be in a state, made in order; the first that finds trouble ends the run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,36 +9,36 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, enclosed_volume
 from fem_reference.runs.contents import Status
 
-# A body spread this many times as wide as at rest, or as its attached part, is lost.
+# A body this many times as wide as at rest, or as its attached part, is lost.
 _WIDE = 10.0
-# So is one of this many times its volume. Flesh keeps its volume within a few percent, and a surface that keeps its dihedral
-# angles alone was seen at twice its volume; one blown up by a wrong root or by scaling has no such bound. What the bones draw
-# out to n times its length may have n times that.
+# A body of this many times its volume is lost too. Flesh keeps its volume within a few percent, and a surface that keeps only its
+# dihedral angles was seen at twice its volume; a wrong root or scaling has no such bound. A body that the bones draw out to n
+# times its length may have n times that.
 _LARGE = 5.0
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """The status that a state ends a run with, and what is wrong with it."""
+    """The status with which a state ends a run, and its defect."""
 
     status: Status
     sentence: str
 
 
 class StateCheck(Protocol):
-    """A check of states (n, 3) [mm], or of what they are made of (n,)."""
+    """A check of states (n, 3) [mm], or of their unknowns (n,)."""
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """The trouble with a ``state``, or with the step that was taken from it; None without."""
+        """The trouble with a ``state``, or with the step that led to it; None without."""
 
 
 def first_trouble(checks: Iterable[StateCheck], state: Floats) -> Trouble | None:
-    """The trouble that the first of the ``checks`` finds which finds some; those after it are not asked."""
+    """The first trouble that the ``checks`` find; later ones are not made."""
     return next((found for check in checks if (found := check.trouble(state)) is not None), None)
 
 
 class Finite:
-    """All positions are numbers."""
+    """Checks that all positions are numbers."""
 
     def trouble(self, state: Floats, /) -> Trouble | None:
         """Diverged where a position is not a number."""
@@ -49,7 +49,7 @@ class Finite:
 
 
 class Width:
-    """No surface is spread much wider than at ``rest``, or than its ``attached`` vertices (k,)."""
+    """Checks that no surface spreads much wider than at ``rest``, or than its ``attached`` vertices (k,)."""
 
     def __init__(self, rest: Surface, attached: Ints) -> None:
         self.attached, self.at_rest = attached, diagonal(rest.points)
@@ -63,7 +63,7 @@ class Width:
 
 
 class Volume:
-    """No surface is turned inside out, or encloses much more than at ``rest``."""
+    """Checks that no surface is turned inside out, or encloses much more than at ``rest``."""
 
     def __init__(self, rest: Surface, attached: Ints) -> None:
         self.rest, self.attached = rest, attached
@@ -81,5 +81,5 @@ class Volume:
 
 
 def surface_checks(rest: Surface, attached: Ints) -> tuple[StateCheck, ...]:
-    """The checks of a closed surface with ``attached`` vertices (k,), in their order: without positions there is no volume."""
+    """The checks of a closed surface with ``attached`` vertices (k,), in order: without positions there is no volume."""
     return Finite(), Width(rest, attached), Volume(rest, attached)

@@ -1,7 +1,7 @@
 """The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
 
-This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexec`` for more than one rank), passes the problem as
-a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
+This side needs no FEniCSx. It runs ``worker`` in subprocesses (``mpiexec`` for more than one rank), passes the problem as a file,
+and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
 import logging
@@ -37,7 +37,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
 
 log = logging.getLogger(__name__)
 
-# Ranks that any machine may be asked for; more only where there are as many cores.
+# Ranks that any machine accepts; more only where there are as many cores.
 _MOST_RANKS = 8
 
 __all__ = [
@@ -56,14 +56,14 @@ __all__ = [
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
-    """MissingSoftware where FEniCSx is not installed or the ranks wanted cannot be started."""
+    """Raise MissingSoftware where FEniCSx is not installed or the requested ranks cannot be started."""
     require_installed()
     if isinstance(settings, Settings):
         _command(settings, Path())
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """InputError below ``place`` unless the element suits tetrahedra and the effects, and the ranks how systems are solved."""
+    """Raise InputError below ``place`` unless the element suits tetrahedra and effects, and the ranks suit the linear solver."""
     _check_ranks(settings, join(place, "ranks"))
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
@@ -77,12 +77,12 @@ def solve(problem: MuscleProblem, settings: Settings, sink: Sink) -> Outcome:
 
 
 def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
-    """Solve from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
+    """Continue from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
     there = kept(cut_off, problem.body)
     again = settings.reuse and not any(
         "interval" in effect.needs for effect in problem.body.effects
-    )  # states serve again
+    )  # states are used again
     if there.frames:
         log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
 
@@ -98,7 +98,7 @@ def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOf
 def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
     body = problem.body
     settings = _planned(_with_states(problem, settings), body)
-    job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
+    job = folder.resolve() / "job.pickle"  # a shared process may have been started elsewhere
     job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
     passed: list[float] = list(kept.frames) if kept else []
     outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
@@ -107,12 +107,12 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, folder: Path,
             "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
         )
         outcome = replace(outcome, message=begin + outcome.message)
-    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # which a scene calls them
+    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
 def _solved(job: Path, settings: Settings, sink: Sink) -> Outcome:
-    """The job in a file, by the process that is shared now or by processes of its own."""
+    """Solve the job in a file in the shared process, or else in new processes."""
     own = present() if settings.ranks == 1 else None
     if own is None:
         return _run(_command(settings, job), settings, sink)
@@ -125,7 +125,7 @@ def _solved(job: Path, settings: Settings, sink: Sink) -> Outcome:
 
 
 def _pass_on(problem: MuscleProblem, frame: Frame, sink: Sink, passed: list[float]) -> None:
-    """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
+    """Sink a requested frame and add its number to ``passed``; frames of the relaxation before the first are dropped."""
     if frame.number in problem.frames:
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
             frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest removed")
@@ -134,9 +134,9 @@ def _pass_on(problem: MuscleProblem, frame: Frame, sink: Sink, passed: list[floa
 
 
 def _with_attachment_errors(problem: MuscleProblem, frame: Frame) -> Frame:
-    """The frame with how far attached surface vertices are from where their bones have them, ``attachment_error_rms``
-    and ``attachment_error_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs
-    yield. As it is where nothing is attached.
+    """The frame with the distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
+    ``attachment_error_max`` [mm]. Exact attachments are facets of tets, which cover the vertices only roughly; springs yield.
+    The frame is unchanged where nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -156,15 +156,15 @@ def _with_attachment_errors(problem: MuscleProblem, frame: Frame) -> Frame:
 
 
 def _samples(problem: MuscleProblem) -> dict[str, tuple[Ints, Floats]]:
-    """Places where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
+    """Sample points of displacement: by name, the tet of each point and the point at rest, as the map of the tet gives it."""
     locator = Locator(problem.mesh)
     wanted = {"surface": problem.surface.points, "fibres": problem.fibres.points}
     return {name: (locator.embed(points).tets, np.asarray(points)) for name, points in wanted.items()}
 
 
 def _command(settings: Settings, job: Path) -> list[str]:
-    """The worker's command line. The wheel's MPI has its ``mpiexec`` beside the interpreter; one on the PATH may not fit."""
-    # Under mpi4py's own runner an error on one rank ends all of them; without it the others wait for ever.
+    """The worker's command line. The wheel installs its own ``mpiexec`` beside the interpreter; one on the PATH may not fit."""
+    # mpi4py's own runner ends all ranks after an error on one; without it the others wait forever.
     worker, mpiexec = command("-m", "mpi4py", "-m", f"{__name__}.worker", str(job)), _mpiexec()
     ranks = settings.ranks or 1
     if ranks == 1:
@@ -177,7 +177,7 @@ def _command(settings: Settings, job: Path) -> list[str]:
 
 
 def _planned(settings: Settings, body: Body) -> Settings:
-    """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
+    """The settings with open ones filled in from the size of ``body`` and the machine."""
     chosen = resources.planned(settings, body.mesh, resources.available())
     _check_ranks(chosen, "ranks")
     if chosen.ranks:
@@ -187,13 +187,13 @@ def _planned(settings: Settings, body: Body) -> Settings:
 
 
 def _check_ranks(settings: Settings, place: str) -> None:
-    """InputError at ``place`` where multigrid is to work on more than one rank."""
+    """Raise InputError at ``place`` where multigrid is requested on more than one rank."""
     if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
         raise InputError(place, settings.ranks, "1, on which multigrid works")
 
 
 def _with_states(problem: MuscleProblem, settings: Settings) -> Settings:
-    """The settings with whether states are kept: as asked for, else where those of all frames are small."""
+    """The settings with ``store_state`` filled in: as requested, else True where the states of all frames are small."""
     if settings.store_state is not None:
         return settings
     steps = any("interval" in effect.needs for effect in problem.effects)
@@ -233,7 +233,7 @@ def _frame(event: dict[str, Any]) -> Frame:
             for name in arrays
             if name.startswith("force ")
         }
-        for kind in ("force", "moment"):  # of all that keeps the muscle where it is
+        for kind in ("force", "moment"):  # of all constraints on the muscle
             sums = [arrays[name] for name in arrays if name.startswith(f"{kind} ")]
             pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(sums, axis=0)))
         places = arrays["surface"], arrays["fibres"], arrays["nodes"]

@@ -1,4 +1,4 @@
-"""Scalar fields, solved in the process of FEniCSx."""
+"""Scalar fields, assembled and solved in the FEniCSx process."""
 
 import time
 from typing import Any
@@ -25,7 +25,7 @@ FACET_DEGREE = 5
 
 
 def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
-    """The bilinear and the linear form, compiled; the space; and the node of the problem at each of its unknowns (N,)."""
+    """The compiled bilinear and linear forms, the space, and the problem's node at each unknown (N,)."""
     msh = distribute(problem)
     space = fem.functionspace(msh, ("Lagrange", problem.order))
     psi, test = _state(ufl.TrialFunction(space)), _state(ufl.TestFunction(space))
@@ -36,7 +36,7 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
         strong = sum(effect.strong(psi, place) for effect in problem.effects)
         weak += _by_cell(msh, problem.tau) * problem.advection.along(test) * strong
     dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": QUADRATURE_DEGREE})
-    # With the zero there is a right side even where nothing acts.
+    # The zero makes a right-hand side even without sources.
     residual = weak * dx - fem.Constant(msh, 0.0) * test.value * dx
     for i, slope_measure in enumerate(_flux_measures(msh, problem)):
         slope = evaluate(problem.fluxes[i].slope, place.position, functions)
@@ -54,7 +54,7 @@ def distribute(problem: FieldProblem) -> mesh.Mesh:
 
 
 def nodes(space: Any, problem: FieldProblem) -> Ints:
-    """The node of the problem (N,) that stands at each unknown of ``space``."""
+    """The problem's node (N,) at each unknown of ``space``."""
     msh, layout, count = space.mesh, space.dofmap.dof_layout, len(problem.mesh.points)
     corners = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap]
     found = np.empty(space.dofmap.index_map.size_local, np.int64)
@@ -68,7 +68,7 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
 
 
 def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
-    """The values (N,) in the order of the problem, not-a-number after a failure, and what to report."""
+    """The values (N,) in the order of the problem, not-a-number after a failure, and the numbers to report."""
     begin = time.perf_counter()
     forget_peak_memory()
     left, right, space, node = equations(problem)
@@ -96,14 +96,14 @@ def _state(function: Any) -> FieldState:
 
 
 def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
-    """The function that has on each cell the value (m,) of this cell of the problem."""
+    """The function that is constant on each cell, with the problem's value (m,) there."""
     function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
     function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
     return function
 
 
 def _flux_measures(msh: mesh.Mesh, problem: FieldProblem) -> list[Any]:
-    """A measure of the facets of each flux."""
+    """One measure per flux, over its facets."""
     boundary = msh.topology.dim - 1
     for start, end in ((boundary, boundary + 1), (boundary + 1, boundary), (boundary, 0), (0, boundary + 1)):
         msh.topology.create_connectivity(start, end)
@@ -121,7 +121,7 @@ def _flux_measures(msh: mesh.Mesh, problem: FieldProblem) -> list[Any]:
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
-    """Matrix and right side, with the equation of each unknown that is ``fixed`` (N,), NaN where free, replaced by its value."""
+    """Matrix and right-hand side; the equation of each ``fixed`` (N,) unknown, NaN where free, is replaced by its value."""
     values = fem.Function(space)
     values.x.array[:] = np.nan_to_num(fixed)
     conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]
@@ -134,7 +134,7 @@ def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, A
 
 
 def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
-    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is none."""
+    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is no solution."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
         return x.array, "the equations have a number that is not finite: a formula without a value somewhere?"
@@ -146,7 +146,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     preconditioner.setFactorSolverType("mumps")
     preconditioner.setFactorSetUpSolverType()
     factors = preconditioner.getFactorMatrix()
-    factors.setMumpsIcntl(24, 1)  # find null pivots, instead of dividing by what rounding left of them
+    factors.setMumpsIcntl(24, 1)  # find null pivots instead of dividing by rounding errors
     solver.solve(b, x)
     error, null_pivots = factors.getMumpsInfog(1), factors.getMumpsInfog(28)
     if null_pivots:

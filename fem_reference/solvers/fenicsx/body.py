@@ -1,6 +1,6 @@
 """A body in DOLFINx: spaces, the weak form summed from the effects, boundary conditions, and Newton's method.
 
-Every method is collective: all ranks call it and, where it returns a value, get the same one.
+Every method is collective: all ranks call it and get the same value.
 """
 
 from collections.abc import Callable
@@ -37,13 +37,13 @@ from fem_reference.solvers.fenicsx.validity import Validity
 
 
 class FiniteEnergy:
-    """The ``energy`` of a state is a number."""
+    """Checks that the ``energy`` of a state is a number."""
 
     def __init__(self, energy: Callable[[], float]) -> None:
         self.energy = energy
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where a law is beyond where it has a value."""
+        """Diverged where a law has no value."""
         if np.isfinite(self.energy()):
             return None
         return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
@@ -56,7 +56,7 @@ class AssembledBody:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
         self.conserves = not any(map(_is_changed_from_outside, self.effects))
-        self.judged = False  # whether its energy gap is: then a state halfway is worth it where work is not resolved
+        self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
         self.cells = meshes.own_cells(self.mesh)
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
@@ -83,7 +83,7 @@ class AssembledBody:
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
-        self.modes: float | None = None  # of the state that was examined last
+        self.modes: float | None = None  # of the last examined state
         self.at = body.frames[0]  # the frame of the last good state
         self.nodes = meshes.Nodes(body.mesh, self.cells, self.displacement)
         stored = self.cells, settings.element, self.displacement, self.clock
@@ -100,7 +100,7 @@ class AssembledBody:
     def _contact(self, body: Body, form: forms.Form) -> ContactForces:
         """The contact of bones with this rank's points."""
         law, space, parents = body.contact, self.displacement.space, self.displacement.dofs.ravel()
-        assert law is not None  # asked for only where it is there
+        assert law is not None  # called only where there is a law
         if isinstance(law.on, str):
             facets = form.regions[law.on]
             points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
@@ -109,7 +109,7 @@ class AssembledBody:
         return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
-        """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
+        """Begin with the nodes at ``moved`` of the rest points (n, 3) [mm]."""
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
@@ -121,7 +121,7 @@ class AssembledBody:
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the present state; go back to it where Newton's method fails or a check refuses its result."""
+        """Solve at ``frame`` from the present state; restore it where Newton's method fails or a check refuses the result."""
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -138,22 +138,22 @@ class AssembledBody:
         return found
 
     def go_back(self, before: Floats) -> None:
-        """Take up the last good state again, whose unknowns are those of ``before``."""
+        """Restore the last good state, whose unknowns are ``before``."""
         self.unknowns.x.array[:] = before
         if self.contact:
             self.contact.go_back()
 
     def _begin(self, before: Floats) -> None:
-        """Find with what acceleration the body leaves its rest at ``before``: by a step in which nothing moves."""
+        """Find the initial acceleration of the body at its rest ``before``: by a step in which nothing moves."""
         self.clock.instant(before)
         self.set_frame(self.clock.at)
-        self.newton.solve(self.clock.at)  # of a tangent that is all mass: what it cannot do, the first step will show
+        self.newton.solve(self.clock.at)  # with a tangent that is all mass: if it fails, the first step will show it
         self.clock.begin(self.unknowns.x.array)
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
-        whole turn what acts is as at rest, and the body is not. Its residual proves it.
+        """Take up an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and it is on the
+        path: after a full turn the loads are as at rest, and the body is not. Its residual proves the equilibrium.
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -163,7 +163,7 @@ class AssembledBody:
         if self.recalled is None:
             return False
         self.unknowns.x.array[:] = self.recalled.unknowns
-        self.unknowns.x.array[:] -= self.system.missing()  # rounding of a motion that comes back
+        self.unknowns.x.array[:] -= self.system.missing()  # rounding of a returning motion
         if self.contact:
             self.contact.update(frame)
         proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
@@ -177,13 +177,13 @@ class AssembledBody:
         return proved
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
-        """Have solved ``frame`` before, with these ``unknowns`` (n,) and negative ``modes``."""
+        """Register ``frame`` as solved earlier, with ``unknowns`` (n,) and negative ``modes``."""
         if self.reuse and not self.clock.matters:
             self.set_frame(frame)
             self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
-        """Be in the state of ``frame`` with ``unknowns`` (n,), as when it was reached."""
+        """Take up the state of ``frame`` with ``unknowns`` (n,), as if it was just reached."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         self.at = frame
@@ -191,12 +191,12 @@ class AssembledBody:
             self.contact.update(frame)
             self.contact.settle()
         self.path.settle(self.energy(), connected=False)
-        if not recalled and self.stability is not None:  # an old factorisation serves on
+        if not recalled and self.stability is not None:  # an old factorisation remains in use
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
 
     def _acting(self, frame: float) -> Floats:
-        """All numbers that determine the state at ``frame``, beside the body itself."""
+        """All numbers that determine the state at ``frame``, besides the body itself."""
         amounts = [effect.amount(frame) for effect in self.effects]
         poses = [entry.pose(frame).ravel() for entry in self.contact.bones] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
@@ -204,7 +204,7 @@ class AssembledBody:
         return np.concatenate([amounts, allowed, *poses, *values])
 
     def set_frame(self, frame: float) -> None:
-        """Set what acts and is prescribed at ``frame``."""
+        """Set loads and prescribed values at ``frame``."""
         self.set_amounts(frame)
         for one in self.conditions:
             one.move_to(frame)
@@ -223,11 +223,11 @@ class AssembledBody:
         return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
-        """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept
-        for when what acts is the same again. None where the tangent is not symmetric.
+        """The number of directions in which the energy falls from the present state, which is that of ``frame``; None where the
+        tangent is not symmetric. The state is kept for later frames with the same loads.
 
-        With drag or viscosity these are the directions in which the energy does so by more than a factor e over all frames, were
-        the body attached still from now on: the viscous stress of this step is left out.
+        With drag or viscosity a direction counts if the energy falls along it by more than a factor e over all frames, with the
+        body attached still from now on: the viscous stress of this step is left out.
         """
         if self.recalled is not None:
             self.modes = self.recalled.negative_modes
@@ -242,13 +242,13 @@ class AssembledBody:
         return modes
 
     def modes_of_material(self) -> float:
-        """The negative modes of the present state that the material has for certain."""
-        assert self.stability is not None  # it has counted some
+        """The negative modes of the present state that the material certainly has."""
+        assert self.stability is not None  # it has counted modes
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()
 
     def energy(self) -> float:
-        """The energy [N mm] that is stored inside."""
+        """The stored energy [N mm]."""
         own = self.system.cells.stabilising_energy()
         return self.integral(self.energy_form) + float(self.comm.allreduce(own, MPI.SUM))
 
@@ -261,11 +261,11 @@ class AssembledBody:
         return self.nodes.positions()
 
     def state(self) -> dict[str, Any]:
-        """The arrays of ``states.NodalState`` by name; nothing where they were not asked for."""
+        """The arrays of ``states.NodalState`` by name; empty where they were not requested."""
         return {} if self.nodal is None else self.nodal.state().arrays
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
-        """The present positions (n, 3) [mm] of ``points`` (n, 3) at rest, each of a cell of ``cells`` (n,); on every rank."""
+        """The present positions (n, 3) [mm] of rest ``points`` (n, 3), each in a cell of ``cells`` (n,); on every rank."""
         displacement = fem.Function(self.displacement.space)
         displacement.x.array[:] = self.unknowns.x.array[self.displacement.dofs.ravel()]
         mine = np.array([i for i, cell in enumerate(cells) if int(cell) in self.local], dtype=np.int64)
@@ -278,13 +278,13 @@ class AssembledBody:
 
 
 def _is_changed_from_outside(effect: Effect) -> bool:
-    """True of an energy that changes though the body does not deform."""
+    """True of an energy that changes without deformation of the body."""
     return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
 
 
 def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spent: Spent) -> LinearSolver:
-    """The solver of linear systems that ``settings`` ask for, or the one for the size of the ``system``."""
-    system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
+    """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
+    system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # the type that the stubs declare
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
         return Multigrid(system, settings.element, spent)

@@ -35,16 +35,16 @@ class PrescribedRegion:
 
     @property
     def prescribed(self) -> Floats:
-        """The values (n,) that the unknowns ``dofs`` shall have now."""
+        """The values (n,) prescribed now for the unknowns ``dofs``."""
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     @property
     def targets(self) -> Floats:
-        """The values (n,) that the unknowns ``exact`` shall have."""
+        """The values (n,) prescribed for the unknowns ``exact``."""
         return self.prescribed if self.entry.stiffness is None else np.zeros(0)
 
     def springs(self, form: Form) -> Any:
-        """The weak form of springs that pull towards what is prescribed, 0 where it is exact."""
+        """The weak form of springs that pull towards the prescribed displacement, 0 where it is exact."""
         if self.entry.stiffness is None:
             return 0
         measure = form.measure(str(self.entry.on))
@@ -58,9 +58,9 @@ class PrescribedRegion:
         self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(self.rest, frame)
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
-        """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
-        ``residual`` of what acts in the body and the unknowns ``now``. Of an unknown that several regions prescribe
-        each takes an equal part: ``shared`` (n,) says how many do.
+        """The force (3,) [N] on this rank's part of the region and its moment (3,) [N mm] about the origin, from the
+        ``residual`` of the effects in the body and the unknowns ``now``. Regions that prescribe the same unknown
+        share its force equally: ``shared`` (n,) counts them.
         """
         places, forces = self.rest + now[self.all], np.zeros_like(self.rest)
         forces[:, self.along] = (residual[self.all] / np.maximum(shared[self.all], 1))[:, self.along]
@@ -70,13 +70,13 @@ class PrescribedRegion:
 
 
 class PointSprings:
-    """A ``Prescribed`` by springs at the ``points`` of this rank's cells: they are not unknowns, so that none is exact."""
+    """A ``Prescribed`` by springs at ``points`` of this rank's cells. The points are not unknowns, so none is exact."""
 
     exact: Ints = np.zeros(0, np.int64)
     targets: Floats = np.zeros(0)
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
-        assert entry.stiffness is not None  # body.check
+        assert entry.stiffness is not None  # body.check ensures it
         self.entry, self.unknowns, self.points = entry, unknowns, points
         along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
@@ -84,7 +84,7 @@ class PointSprings:
 
     @property
     def prescribed(self) -> Floats:
-        """The places (3 n,) [mm] where the points shall be now."""
+        """The present targets (3 n,) [mm] of the points."""
         return self.wanted.ravel()
 
     def move_to(self, frame: float) -> None:
@@ -92,19 +92,21 @@ class PointSprings:
         self.wanted = self.points.rest + self.entry.path(self.points.rest, frame)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add what pulls to ``residual`` over this rank's unknowns; as if the unknowns had made ``moves`` (n,), where given."""
+        """Add the spring forces to ``residual`` over this rank's unknowns; linearly advanced by ``moves`` (n,) of them, where
+        given.
+        """
         now = self.unknowns.x.array
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
-        """The slope of the residual, as ``ContactForces.tangent`` has it."""
+        """The derivative of the residual, as in ``ContactForces.tangent``."""
         return self.points.cells, self.points.basis, self.stiffness[:, :, None] * np.eye(3)
 
     def force(self, _residual: Floats, now: Floats, _shared: Ints) -> tuple[Floats, Floats]:
-        """The force of the springs and its moment, as ``PrescribedRegion.force`` has them."""
+        """The force of the springs and its moment, as in ``PrescribedRegion.force``."""
         pulls = -self._pulls(now)
         return pulls.sum(axis=0), np.cross(self.points.positions(now), pulls).sum(axis=0)
 
     def _pulls(self, unknowns: Floats) -> Floats:
-        """The forces (n, 3) [N] of the points on the springs."""
+        """The forces (n, 3) [N] that the points exert on the springs."""
         return self.stiffness * (self.points.positions(unknowns) - self.wanted)

@@ -1,4 +1,4 @@
-"""Leaving an unstable equilibrium: along the direction in which the energy falls most, to where it falls in fewer."""
+"""Departure from an unstable equilibrium along its lowest mode, to a state with fewer negative modes."""
 
 import numpy as np
 from mpi4py import MPI
@@ -10,13 +10,13 @@ from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import displacements, softest
 
-_LARGER = (1, 2, 4, 8)  # how much larger perturbations are tried, where the state comes back or none is found
+_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn where the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
-    """Perturb the present state, that of a ``frame``, by a ``share`` of the body's size along its lowest mode, and solve anew until
-    there are fewer negative modes; the perturbation [mm], None where the state is stable or nothing else was found. Collective.
+    """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again
+    until there are fewer negative modes. The perturbation [mm]; None where the state is stable or no other was found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -39,11 +39,11 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 
 def lowest(body: AssembledBody) -> Floats:
-    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most: by inverse iteration with a shift
+    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most. Inverse iteration, with a shift
     that makes the tangent definite.
     """
     system, stability, dofs = body.system, body.stability, body.displacement.dofs
-    assert stability is not None  # asked for only where modes are counted
+    assert stability is not None  # called only where modes are counted
     system.linearise()
     free, diagonal = np.zeros(system.size), system.b.duplicate()
     free[dofs.ravel()] = 1.0
@@ -65,9 +65,9 @@ def lowest(body: AssembledBody) -> Floats:
 
 
 def _shifted(matrix: PETSc.Mat, shift: Floats, spent: Spent) -> Factorised:
-    """The factors of the matrix with a ``shift`` (n,) of its diagonal."""
+    """The factors of the matrix with ``shift`` (n,) added to its diagonal."""
     raised, diagonal = matrix.duplicate(copy=True), matrix.getDiagonal()
     diagonal.array[:] += shift
     raised.setDiagonal(diagonal)
-    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # as its stubs have it
+    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # the type that the stubs declare
     return Factorised(raised, True, False, "double", spent)

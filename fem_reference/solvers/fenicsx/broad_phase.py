@@ -1,5 +1,5 @@
-"""Material points that may be near a bone: whole patches of them, the points of a cell, are out of reach until their nodes
-have gone as far as they were away.
+"""Material points that may be near a bone. The points of a cell form a patch, which is out of reach until its nodes have moved
+as far as the patch was away.
 """
 
 from collections.abc import Callable
@@ -12,9 +12,9 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 class Patches:
-    """The points of each of p cells. No point goes farther than the farthest of its cell's k nodes, times the ``spread`` (p,): the
-    sum of the magnitudes of their functions there. Where these do not give the place at rest, a turn takes it by ``off`` (p,)
-    [mm] more at most.
+    """The points of each of p cells. No point moves farther than the farthest of its cell's k nodes, times ``spread`` (p,): the
+    sum of the magnitudes of their functions there. Where the functions do not give the rest position, a rotation adds at most
+    ``off`` (p,) [mm].
     """
 
     def __init__(self, points: ContactPoints) -> None:
@@ -30,16 +30,16 @@ class Patches:
         np.maximum.at(self.off, patch, 2 * np.linalg.norm(points.rest - rest, axis=1))
 
     def points(self, some: Ints) -> tuple[Ints, Ints]:
-        """The points (n,) of ``some`` patches, one patch after the other, and where those of each begin."""
+        """The points (n,) of ``some`` patches, patch by patch, and the start index of each patch."""
         counts = self.starts[some + 1] - self.starts[some]
         begins = np.cumsum(counts) - counts
         return self.order[np.repeat(self.starts[some] - begins, counts) + np.arange(counts.sum())], begins
 
 
 class Nearby:
-    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. By patch: how ``free`` (p,)
-    [mm] its points were when they were looked at last, with its nodes where they were ``seen`` (p, k, 3), in the bone's
-    frame; and whether they were ``met`` since the last settled state.
+    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. For each patch: the clearance
+    ``free`` (p,) [mm] of its points at the last search, the positions ``seen`` (p, k, 3) of its nodes then, in the bone's frame,
+    and whether it was ``met`` since the last settled state.
     """
 
     def __init__(self, shape: Obstacle, reach: float, patches: Patches) -> None:
@@ -49,8 +49,8 @@ class Nearby:
         self.met = np.ones(patches.count, bool)
 
     def find(self, nodes: Floats, local: Callable[[Ints], Floats]) -> tuple[Ints, Sampled]:
-        """The points (n,) that may be within reach, with ``nodes`` (m, 3) [mm] in the bone's frame, and the distance there;
-        ``local`` says where any points are in that frame.
+        """The points (n,) that may be within reach, and the distance there. ``nodes`` (m, 3) [mm] are in the bone's frame;
+        ``local`` gives the positions of points in that frame.
         """
         now = nodes[self.patches.nodes]
         moved = np.sqrt(((now - self.seen) ** 2).sum(axis=2).max(axis=1, initial=0.0))
@@ -68,8 +68,8 @@ class Nearby:
     def crossing(
         self, before: Callable[[Ints], Floats], after: Callable[[Ints], Floats]
     ) -> tuple[Ints, Floats, Floats]:
-        """The points (n,) whose straight path since the settled state may have come within reach, and both its ends (n, 3), which
-        ``before`` and ``after`` say of any. A patch that was not met is in a ball that is clear, and so are its paths.
+        """The points (n,) whose straight path since the settled state may have come within reach, and its ends (n, 3); ``before``
+        and ``after`` give them for any points. A patch that was not met lies in a clear ball, and so do its paths.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

@@ -1,4 +1,4 @@
-"""The sums over cells: residual and tangent of the energy, by compiled loops (``cells.c``), in chunks that fit into a cache."""
+"""Residual and tangent of the energy, summed over cells by compiled loops (``cells.c``), in chunks that fit into a cache."""
 
 import ctypes
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class _Element(ctypes.Structure):
 
 
 class Structure(NamedTuple):
-    """The places of the entries of a matrix over this rank's unknowns, ghosts too: ``starts`` of rows in the sorted ``columns``."""
+    """The sparsity of a matrix over this rank's unknowns, ghosts too: ``starts`` of rows in the sorted ``columns``."""
 
     starts: Places
     columns: Places
@@ -34,8 +34,8 @@ class Structure(NamedTuple):
 
 @dataclass
 class Tangent:
-    """The ``entries`` (e + 1,) of a matrix, where in them those of each cell are, ``places`` (m, u, u), and the ``unit`` in which
-    pressures are unknown; the last entry takes what belongs to what is prescribed.
+    """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of
+    unknown pressures. The last entry collects those of prescribed unknowns.
     """
 
     entries: Floats
@@ -44,8 +44,8 @@ class Tangent:
 
 
 class CellSums:
-    """The sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, component by component of the displacement,
-    then the pressures; ``structure``: of the tangent.
+    """The sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, by component of the displacement, then
+    the pressures; ``structure``: that of the tangent.
     """
 
     def __init__(self, form: Form, unknowns: fem.Function, element: str) -> None:
@@ -56,7 +56,7 @@ class CellSums:
         self.unknowns = _unknowns(space)[: self.count]
         self.nodes = space.sub(0).sub(0).dofmap.list.shape[1]
         tables = _tables(element, msh, form.rule)
-        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # C only has their addresses
+        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # C only holds their addresses
         self.element = _Element(*(table.ctypes.data for table in self.kept))
         self.corners = np.ascontiguousarray(msh.geometry.x[msh.geometry.dofmap[: self.count]])
         self.code = compiling.library(
@@ -72,7 +72,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The entries that cells have, and all of the diagonal."""
+        """The sparsity of the cells' entries, with the whole diagonal."""
         rows = np.repeat(np.arange(self.count), self.unknowns.shape[1])
         has = csr_array(
             (np.ones(len(rows), bool), (rows, self.unknowns.ravel())), shape=(self.count, self.size), dtype=bool
@@ -85,8 +85,8 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """The places of the entries of each cell (m, u, u) in those of ``structure``; those of an unknown that is ``fixed`` (n,)
-        are at one place beyond the last.
+        """The places of each cell's entries (m, u, u) among those of ``structure``; entries of a ``fixed`` (n,) unknown share one
+        place after the last.
         """
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         self.code.find_places(
@@ -98,23 +98,22 @@ class CellSums:
         return found
 
     def add_residual(self, residual: Floats) -> None:
-        """Add the forces of cells to ``residual`` (n,), over this rank's unknowns, ghosts too."""
+        """Add the forces of cells to ``residual`` (n,) over this rank's unknowns, ghosts too."""
         for some in self._chunks():
             self._add(self.form.derivatives.first, some, residual)
         self._stabilise(residual)
 
     def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None, *, pointwise: bool = False) -> None:
-        """Add the tangent ``into`` its entries, and the forces to ``residual``: where there are ``moves`` (n,) of the
-        displacement, what they change it by as well, to first order. ``pointwise``: as if the pressure followed the volume at
-        every point, and was no unknown of its own.
+        """Add the tangent to ``into`` and the forces to ``residual``, with their first-order change by ``moves`` (n,) of the
+        displacement, where given. ``pointwise``: the pressure follows the volume at every point and is no unknown of its own.
         """
         for some in self._chunks():
             self._add(self.form.derivatives.second, some, residual, into, moves, pointwise=pointwise)
         self._stabilise(residual, into)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
-        """Add the tangent of tractions at points of ``cells`` (n,) that are carried by their ``basis`` (n, k): the ``slope``
-        (n, 3, 3) of the tractions in where the points are.
+        """Add the tangent of tractions at points of ``cells`` (n,) with the values ``basis`` (n, k) of their functions; ``slope``
+        (n, 3, 3) is the derivative of the tractions by the positions of the points.
         """
         arrays = (cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope))
         self.code.add_points(
@@ -122,8 +121,8 @@ class CellSums:
         )
 
     def softness(self) -> Floats:
-        """The mass matrix (m, p, p) by cell of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the
-        mean of the diagonal of the energy's second derivatives, and the bulk modulus.
+        """The mass matrix (m, p, p) by cell of the pressures [mm3/MPa] over the stiffness against them: twice the shear
+        stiffness, from the mean diagonal of the energy's second derivatives, and the bulk modulus.
         """
         rows, basis = self._diagonal(), self._pressures()
         stiff = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3)]
@@ -135,14 +134,14 @@ class CellSums:
         return found
 
     def stabilising_energy(self) -> float:
-        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 of elements that need none."""
+        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements that need none."""
         if self.projection is None:
             return 0.0
         values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]
         return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
 
     def _stabilise(self, residual: Floats, into: Tangent | None = None) -> None:
-        """Add what stabilises the pressure, where the element needs it."""
+        """Add the stabilisation of the pressure, where the element needs it."""
         if self.projection is None:
             return
         names = self.unknowns[:, 3 * self.nodes :]
@@ -152,7 +151,7 @@ class CellSums:
             np.subtract.at(into.entries, own, into.unit**2 * self.projection)
 
     def _projection(self) -> Floats:
-        """The second derivative (m, p, p) by cell [mm3/MPa] of minus the energy of ``body.is_stabilised``, at rest."""
+        """The second derivative (m, p, p) by cell [mm3/MPa] of the negative energy of ``body.is_stabilised``, at rest."""
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
@@ -166,7 +165,7 @@ class CellSums:
         return found
 
     def _diagonal(self) -> list[int]:
-        """The places of the second derivatives by one variable twice among the derivatives at a point."""
+        """The places of the diagonal second derivatives among the derivatives at a point."""
         count = 3 * self.form.kinds + 1
         return [count + v * count - v * (v - 1) // 2 for v in range(count)]
 
@@ -175,12 +174,12 @@ class CellSums:
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _second(self, some: slice) -> Floats:
-        """First and second derivatives of the energy at the points of some cells (m, q, v), at present."""
+        """First and second derivatives of the present energy at the points of some cells (m, q, v)."""
         cells = np.arange(some.start, some.stop, dtype=np.int32)
         return np.asarray(self.form.derivatives.second.eval(self.mesh, cells))
 
     def _volumes(self, some: slice) -> Floats:
-        """The volumes (m, q) [mm3] that the points of some cells stand for."""
+        """The volumes (m, q) [mm3] of the quadrature points of some cells."""
         slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
         return np.asarray(np.abs(np.linalg.det(slopes)) * self.kept[0])
 
@@ -215,8 +214,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives by ``others`` and the pressure, and the upper triangle of the second ones, (..., v), with the stiffness
-    that the pressure gives the others, K cof F x cof F, in place of what couples them.
+    """First derivatives by ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The stiffness from
+    the pressure, K cof F x cof F, replaces the terms that couple pressure and the others.
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others
@@ -233,14 +232,14 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def _unknowns(space: fem.FunctionSpace) -> Places:
-    """The unknowns of each cell, ghosts too: component by component of the displacement, then the pressures."""
+    """The unknowns of each cell, ghosts too: by component of the displacement, then the pressures."""
     parts = [space.sub(0).sub(component) for component in range(3)]
     parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
     return np.concatenate([part.dofmap.list for part in parts], axis=1).astype(np.int32)
 
 
 def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:
-    """The tables of an element at the points of a ``rule`` that ``cells.c`` needs."""
+    """The tables that ``cells.c`` needs of an element at the points of a ``rule``."""
     kind, degree, pressure = ELEMENTS[element]
     points, weights = rule
     cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped

@@ -1,4 +1,4 @@
-"""The time that passes in load steps, for effects that feel velocities, and the velocities of masses with inertia."""
+"""The time of load steps, for effects that depend on velocities, and the velocities of bodies with inertia."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,28 +10,28 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.forms import TimeStep
 
-# Of all frames, how long forces act in which nothing moves yet, to know the acceleration that they begin with.
+# Share of all frames for which forces act on a body at rest, to find its initial acceleration.
 _INSTANT = 1e-7
 
 
 class Momentum(Protocol):
-    """An effect that asks for momentum: its method of steps in time."""
+    """Time integration of an effect with momentum."""
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement that velocities alone would lead to."""
+        """The displacement predicted from velocities alone."""
 
     def advanced(self, u: Any, v: Any, a: Any, now: Any, seconds: float) -> tuple[Any, Any]:
         """Velocity and acceleration after a step."""
 
     def begun(self, u: Any, seconds: float) -> Any:
-        """The acceleration after an instant from rest."""
+        """The acceleration after an instant, from rest."""
 
 
 class Clock:
-    """Sets the ``step`` of time of a form; nothing where there is none.
+    """Sets the time ``step`` of a form; does nothing for a form without one.
 
-    With inertia a body is at rest up to its first frame that is wanted: ``resting`` until it has the acceleration with which it
-    leaves that, and velocities from then on.
+    With inertia a body is at rest up to its first requested frame: ``resting`` until its initial acceleration is known, moving
+    with velocities from then on.
     """
 
     def __init__(self, body: Body, step: TimeStep | None) -> None:
@@ -44,16 +44,16 @@ class Clock:
 
     @property
     def matters(self) -> bool:
-        """True where anything feels how fast time passes."""
+        """True where an effect depends on the rate of motion."""
         return self.step is not None
 
     def start(self, frame: float, unknowns: Floats) -> None:
-        """A load step from the last settled frame, with its ``unknowns``, to ``frame``."""
+        """Start a load step from the last settled frame, with its ``unknowns``, to ``frame``."""
         if self.step is not None:
             self._set(unknowns, self._seconds(frame - self.at))
 
     def settle(self, frame: float, unknowns: Floats) -> None:
-        """The load step to ``frame``, which ends with ``unknowns``, is the last good one."""
+        """Settle the load step to ``frame``, which ends with ``unknowns``, as the last good one."""
         if self.step is not None and self.momentum is not None and frame > self.first:
             moved = (self.step.before.x.array, self.velocity, self.acceleration, unknowns)
             self.velocity, self.acceleration = self.momentum.advanced(*moved, 1 / float(self.step.rate.value))
@@ -62,15 +62,15 @@ class Clock:
         self.at = frame
 
     def begins(self) -> bool:
-        """True where a body with inertia moves for the first time in the next load step; its acceleration has to be known."""
+        """True where a body with inertia first moves in the next load step; its acceleration has to be known."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
-        """A load step so short that nothing moves, from rest at ``unknowns``."""
+        """Start a load step so short that nothing moves, from rest at ``unknowns``."""
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
-        """The instant ended with ``unknowns``: velocities are 0, and accelerations known."""
+        """End the instant with ``unknowns``: velocities are 0, and accelerations known."""
         assert self.step is not None  # there is momentum
         assert self.momentum is not None
         moved = unknowns - self.step.before.x.array
@@ -78,7 +78,7 @@ class Clock:
 
     @contextmanager
     def slow(self, unknowns: Floats) -> Iterator[None]:
-        """Meanwhile a step would start from ``unknowns`` and take as long as all frames."""
+        """Meanwhile a step starts from ``unknowns`` and lasts as long as all frames."""
         if self.step is None:
             yield
             return
@@ -95,19 +95,19 @@ class Clock:
                 one.x.array[:] = values
 
     def arrays(self) -> dict[str, Floats]:
-        """The arrays to be known of the last load step beside the unknowns that it ended with."""
+        """The arrays that restore the last load step, besides the unknowns at its end."""
         if self.step is None:
             return {}
         found = {"before": np.array(self.step.before.x.array)}
         return found | ({"velocity": self.velocity, "acceleration": self.acceleration} if self.momentum else {})
 
     def facts(self) -> dict[str, Any]:
-        """The numbers to be known, beside the ``arrays``."""
+        """The numbers that restore the clock, besides the ``arrays``."""
         rate = None if self.step is None else float(self.step.rate.value)
         return {"at": self.at, "resting": self.resting, "rate": rate}
 
     def take_up(self, arrays: dict[str, Floats], facts: dict[str, Any]) -> None:
-        """Be as the clock that gave ``arrays`` and ``facts``."""
+        """Restore the clock that gave ``arrays`` and ``facts``."""
         self.at, self.resting = facts["at"], facts["resting"]
         if self.step is None:
             return
@@ -117,7 +117,7 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def _set(self, unknowns: Floats, seconds: float) -> None:
-        assert self.step is not None  # the caller asked
+        assert self.step is not None  # called only with momentum
         self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds
         if self.momentum is not None and self.step.predicted is not None:
             self.step.predicted.x.array[:] = self.momentum.predicted(

@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: each by one process at a time, which removes what another left half-done."""
+"""Compilation of forms for this machine: one process at a time compiles a form and removes incomplete files of others."""
 
 import hashlib
 import os
@@ -25,13 +25,13 @@ from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-PATIENCE = 300  # [s] that a process waits for the compilation of one that takes no lock
-_LOCKS = 64  # forms share them; one that is taken shows that something is compiled
+PATIENCE = 300  # [s] that a process waits for a compilation without a lock
+_LOCKS = 64  # shared by the forms; a locked one shows that something is compiled
 
 
 @cache
 def machine() -> str:
-    """The kind of this processor, as a hash: what is compiled for one need not run on another."""
+    """The kind of this processor, as a hash: code compiled for one kind need not run on another."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         known = next(line for line in lines if line.startswith(("flags", "Features")))
@@ -40,8 +40,8 @@ def machine() -> str:
     return hashlib.sha256(f"{platform.machine()} {known}".encode()).hexdigest()[:12]
 
 
-# All instructions of this machine, and sums in any order. Never -ffast-math itself: it takes for granted that nothing is NaN, by
-# which a state without a value is detected, and makes the whole process round denormal numbers to zero.
+# All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that nothing is NaN, but NaN
+# shows a state without a value; and it makes the whole process round denormal numbers to zero.
 FLAGS = [
     "-O3",
     "-march=native",
@@ -51,7 +51,7 @@ FLAGS = [
     "-fassociative-math",
     "-freciprocal-math",
 ]
-# FFCx keeps what it compiled by what it is and by these words, the machine among them.
+# FFCx stores compiled forms under their content and these options, the machine among them.
 OPTIONS: dict[str, Any] = {
     "timeout": PATIENCE,
     "cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"],
@@ -59,13 +59,13 @@ OPTIONS: dict[str, Any] = {
 
 
 def lock(folder: Path, number: int) -> FileLock:
-    """The lock of that ``number``, of those that forms share, in the ``folder`` of what is compiled."""
+    """The lock of that ``number``, among those that forms share, in the ``folder`` of compiled forms."""
     return FileLock(folder / f".fem_reference_{number}.lock")
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, by one process at a time for what is the same: it takes for granted that nothing of a form is there
-    when it has compiled it, and ends with an error where an interrupted process, or one that was taken for dead, left some.
+    """FFCx's compilation, run by one process at a time for the same form. FFCx assumes that no file of a form exists once it has
+    compiled it, and fails on files that an interrupted or presumed dead process left.
     """
 
     @wraps(compiled)
@@ -87,7 +87,7 @@ generator.compile_expressions = _alone(generator.compile_expressions)
 
 
 def form(expression: Any, entity_maps: Any = None) -> Any:
-    """A compiled form; ``entity_maps``: how meshes that meet in it lie in each other."""
+    """A compiled form; ``entity_maps`` relate the meshes that it combines."""
     return fem.form(expression, jit_options=OPTIONS, entity_maps=entity_maps)
 
 
@@ -97,15 +97,15 @@ def expression(value: Any, points: Any) -> Any:
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
-    """Compiled expressions at reference ``points`` (q, 3): of the ``first`` ones of the scalars ``values``, and of all of them."""
+    """Compiled expressions at reference ``points`` (q, 3): the ``first`` ones of the scalars ``values``, and all of them."""
     whole = _expanded(ufl.as_vector(values))
     parts = ufl.as_vector(whole.ufl_operands[:first])
     return tuple(fem.Expression(one, points, jit_options=OPTIONS) for one in (parts, whole))
 
 
 def _expanded(value: Any) -> Any:
-    """``value`` with its derivatives worked out, and without the variables that it was differentiated by: they are numbered through
-    the whole process, so that what is compiled would not be found again.
+    """``value`` with its derivatives expanded and without its variables of differentiation: UFL numbers these through the whole
+    process, so a compiled form would not be found again.
     """
     return map_expr_dag(_WithoutVariables(), expand_derivatives(value))
 
@@ -118,7 +118,7 @@ class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no type
 
 
 def library(source: Path, sizes: dict[str, int]) -> CDLL:
-    """The functions of a C file, compiled with ``sizes`` and kept beside what FFCx compiles."""
+    """The functions of a C file, compiled with ``sizes`` and kept beside FFCx's compiled forms."""
     words = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
     compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
     key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *words, machine()]).encode())
@@ -129,7 +129,7 @@ def library(source: Path, sizes: dict[str, int]) -> CDLL:
         with tempfile.TemporaryDirectory(dir=folder) as new:
             made = Path(new) / kept.name
             _compile([*compiler, *words, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made)])
-            made.replace(kept)  # whole or not at all, also where several processes compile it
+            made.replace(kept)  # atomic, also where several processes compile it
     return CDLL(str(kept))
 
 
@@ -140,23 +140,23 @@ def _compile(command: list[str]) -> None:
 
 
 def prepare() -> None:
-    """Make an interrupted compilation clean up after itself, and clean up after processes that could not: what they left half-done
-    others would wait for.
+    """Make an interrupted compilation clean up, and remove incomplete files of processes that could not: others would wait for
+    them.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ours to end is the parent's business
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, _stop)
     folder = Path(jit.get_options()["cache_dir"])
     with ExitStack() as locks:
         try:
             for path in folder.glob(".fem_reference_*.lock"):
                 locks.enter_context(FileLock(path).acquire(timeout=0))
-        except Timeout:  # what looks half-done may be in the making
+        except Timeout:  # an incomplete file may still be in progress
             return
         _remove_broken(folder)
 
 
 def _remove_broken(folder: Path) -> None:
-    """Remove what was begun ``PATIENCE`` ago and not ended, and what says that it is there and of which a part is missing."""
+    """Remove files begun ``PATIENCE`` ago and not finished, and marks of finished forms that lack a file."""
     for source in folder.glob("*.c"):
         with suppress(FileNotFoundError):
             done = source.with_suffix(".c.cached").exists()

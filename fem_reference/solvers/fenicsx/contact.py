@@ -1,7 +1,7 @@
-"""Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
+"""Contact of bones with material points of a body: pressure of the gap with its tangent, added to the sums over cells.
 
-Only points that may be near a body are asked for their distance to it (``broad_phase``), and only those that it presses are summed.
-A load step that begins and ends where nothing is pressed is solved without it.
+Distances are computed only for points that may be near a bone (``broad_phase``), and only points under pressure are summed. A
+load step that begins and ends without contact pressure is solved without contact.
 """
 
 from collections.abc import Iterator
@@ -21,17 +21,18 @@ from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in a bone than this share of its half thickness is as good as through.
+# A point deeper in a bone than this share of its half thickness counts as through.
 _GIVEN_WAY = 0.75
-# What slides round a rim may be so deep in it on its straight path, of half the thickness, and what smoothing rounds; no deeper.
+# Greatest depth in a rim of the straight path of a point that slides round it, as a share of half the thickness; the
+# smoothing bounds it too.
 _RIM = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), no other point is within the
-    smoothing; and of the ``pressed`` points (k,) among them the ``pressure`` (k,) [MPa per rest area], ``traction`` (k, 3) and its
-    ``slope`` (k, 3, 3) [MPa/mm].
+    """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,); no other point is within the
+    smoothing. Of the ``pressed`` points (k,) among them: the ``pressure`` (k,) [MPa per rest area], the ``traction`` (k, 3) and
+    its derivative ``slope`` (k, 3, 3) [MPa/mm].
     """
 
     near: Ints
@@ -42,7 +43,7 @@ class Pressed:
     slope: Floats
 
 
-# Tractions (n, 3) [MPa] at points (n,), of which some may be there more than once.
+# Tractions (n, 3) [MPa] at points (n,), which may repeat.
 Tractions = tuple[Ints, Floats]
 
 
@@ -58,7 +59,7 @@ class ContactForces:
         frame: float,
         spent: Spent,
     ) -> None:
-        """``frame``: where the body rests."""
+        """``frame``: at which the body is at rest."""
         self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         patches = Patches(points)
@@ -72,14 +73,14 @@ class ContactForces:
         self.settle()
 
     def update(self, frame: float) -> None:
-        """Find the pressures with the unknowns as they are and the bones where they are at ``frame``."""
+        """Find the pressures at the present unknowns, with the bones at their poses of ``frame``."""
         with self.spent.on("contact"):
             self.frame, carried = frame, self.points.carried
             self.moved = self.unknowns.x.array[carried.dofs]
             self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.bones))]
 
     def _pressed(self, i: int, nodes: Floats) -> Pressed:
-        """The contact with one bone, with the ``nodes`` (m, 3) [mm] that carry the points: less of what overlaps at rest."""
+        """The contact with one bone, for ``nodes`` (m, 3) [mm] that carry the points; overlap at rest is subtracted."""
         pose = self.bones[i].pose(self.frame)
         turn, local = pose[:3, :3], partial(self._local, i, self.frame, self.moved)
         near, (gap, gradient, bend) = self.nearby[i].find((nodes - pose[:3, 3]) @ turn, local)
@@ -92,16 +93,16 @@ class ContactForces:
         return Pressed(near, gap, near[some], pressure, pressure[:, None] * normal, slope)
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
-        """The places (k, 3) [mm] of ``some`` points (k,) in the frame of a bone, with nodes ``moved`` (m, 3) by ``frame``."""
+        """The positions (k, 3) [mm] of ``some`` points (k,) in the frame of a bone at ``frame``, with nodes ``moved`` (m, 3)."""
         pose = self.bones[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """The places (k, 3) [mm] of ``some`` points (k,), with nodes ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,), with nodes ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
-        """True where a bone presses a point, of any rank."""
+        """True where a bone presses a point, on any rank."""
         return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
@@ -110,7 +111,7 @@ class ContactForces:
         return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
 
     def predicted(self, frame: float, moves: Floats) -> Tractions:
-        """The ``tractions`` if the unknowns made ``moves`` and the bones went on to ``frame``, linearly in both."""
+        """The ``tractions`` after ``moves`` of the unknowns and with the bones at ``frame``, linearised in both."""
         which, found = self.tractions()
         ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -123,14 +124,14 @@ class ContactForces:
         return which, found + np.concatenate(ahead)
 
     def add_residual(self, residual: Floats, tractions: Tractions | None) -> None:
-        """Add the weak form of ``tractions``, by default those at present, to ``residual`` over this rank's unknowns."""
+        """Add the weak form of ``tractions``, by default the present ones, to ``residual`` over this rank's unknowns."""
         which, found = self.tractions() if tractions is None else tractions
         if len(which):
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The slope of the residual, bone by bone: cells (p,) of the points in contact, the basis (p, k) that carries them, and
-        the slope (p, 3, 3) there.
+        """The derivative of the residual, bone by bone: cells (p,) of the points in contact, the basis (p, k) there, and the
+        derivative ``slope`` (p, 3, 3) of the tractions.
         """
         for one in self.now:
             if len(touched := one.pressed):
@@ -138,7 +139,7 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N], by name of a bone, that it exerts on this rank's points and its moment (3,) [N mm] about the
+        """By name of a bone, the force (3,) [N] that it exerts on this rank's points, and its moment (3,) [N mm] about the
         origin.
         """
         found = {}
@@ -149,9 +150,9 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
-        ``contact_area`` [mm2], how many ``contact_points`` that is and how many were asked for their distance,
-        ``contact_points_near``, and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
+        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point; the rest area in contact,
+        ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries, ``contact_points_near``; and
+        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm].
         """
         comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
@@ -179,23 +180,23 @@ class ContactForces:
         return self._worst(mine) or "nowhere"
 
     def settle(self) -> None:
-        """Take the present state as the one that the next step starts from."""
+        """Take the present state as the start of the next step."""
         self.settled = self.now, self.frame, self.moved
         for one in self.nearby:
             one.met[:] = False
 
     def go_back(self) -> None:
-        """Take up the settled state again, as the unknowns have."""
+        """Restore the settled state, as the unknowns have been."""
         self.now, self.frame, self.moved = self.settled
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where a point went through a bone since the last settled state, or is pressed near to the middle of one."""
+        """Diverged where a point went through a bone since the last settled state, or is pressed near the middle of one."""
         with self.spent.on("contact"):
             why = self.tunnelled() or self.yielded()
         return Trouble("diverged", why) if why else None
 
     def yielded(self) -> str | None:
-        """The bone near whose middle a point is pressed, from where it would leave on any side; None without."""
+        """The bone near whose middle a point is pressed, from where it could leave on any side; None without."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -205,14 +206,14 @@ class ContactForces:
         return self._worst(mine)
 
     def tunnelled(self) -> str | None:
-        """The point that went through a bone since the last settled state: on its straight path through the bone's frame it was
-        inside, deeper than at both ends, and it left on the other side. None where none did.
+        """The point that went through a bone since the last settled state; None without. On its straight path through the bone's
+        frame it was inside, deeper than at both ends, and it left on the other side.
         """
         mine = [one for i in range(len(self.bones)) if (one := self._through(i))]
         return self._worst(mine)
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the greatest number, of any rank; None without."""
+        """The sentence with the greatest number, over all ranks; None without."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
@@ -222,7 +223,7 @@ class ContactForces:
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # A gap is not known far away: what points outward there is the direction back, and the direction on.
+        # Far away no gap is known: the outward direction there is the direction back, or the direction of travel.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

@@ -1,4 +1,4 @@
-"""Contact points, and points that springs pull at: their places in the cells, and the nodes that carry them."""
+"""Contact points and points of springs: their places in the cells, and the nodes that carry them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -18,9 +18,9 @@ from fem_reference.solvers.fenicsx.tabulated import geometry
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """n points of this rank's cells: where they ``rest`` (n, 3) [mm], the rest ``areas`` (n,) [mm2] they stand for, the ``cells``
-    (n,) they move with, and how: the values ``basis`` (n, k) there of the functions of nodes at ``nodes`` (n, k, 3) [mm], whose
-    unknowns are ``dofs`` (n, k, 3).
+    """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,)
+    that carry them, and the values ``basis`` (n, k) there of the functions of nodes at ``nodes`` (n, k, 3) [mm], whose unknowns
+    are ``dofs`` (n, k, 3).
     """
 
     rest: Floats
@@ -36,7 +36,7 @@ class ContactPoints:
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
     def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual``, over this rank's
+        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual`` over this rank's
         unknowns.
         """
         shares = self.carried.shares if some is None else self.carried.shares[some]
@@ -54,8 +54,8 @@ class ContactPoints:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The m nodes that carry n points, each once: their unknowns ``dofs`` (m, 3), where they ``rest`` (m, 3) [mm], by point
-    ``which`` of them (n, k), and the ``shares`` (n, m) that a point has of each.
+    """The m nodes that carry n points, each once: their unknowns ``dofs`` (m, 3), rest positions ``rest`` (m, 3) [mm], the nodes
+    ``which`` (n, k) of each point, and the ``shares`` (n, m) of each point in them.
     """
 
     dofs: Ints
@@ -65,8 +65,8 @@ class Carried:
 
 
 def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points of a rule of ``degree`` on those of the ``facets`` whose cell is this rank's own; ``space`` is that of
-    the displacement, ``parents`` the unknown of each of its degrees of freedom.
+    """The quadrature points, by a rule of ``degree``, on those of the ``facets`` that belong to this rank's own cells. ``space``
+    is that of the displacement, ``parents`` (n,) the unknown of each of its degrees of freedom.
     """
     kind = basix.CellType[mesh.kind]
     sides = _sides(space.mesh.topology, facets)
@@ -77,7 +77,7 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
     for number, vertices in enumerate(topology):
         cells = sides[sides[:, 1] == number, 0]
         first, *others = corners[vertices[:3]]
-        edges = np.stack([other - first for other in others])  # along the two coordinates of the side
+        edges = np.stack([other - first for other in others])  # along the two coordinates of the facet
         within = first + points @ edges
         places, slopes = geometry(space.mesh, within, cells)
         across = np.cross(slopes @ edges[0], slopes @ edges[1])
@@ -89,7 +89,7 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
 
 
 def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> ContactPoints:
-    """The points of a ``skin`` whose cell is this rank's own; ``local``: its number here by that in the body's mesh."""
+    """The points of a ``skin`` in this rank's own cells; ``local`` maps cells of the body's mesh to cells of this rank."""
     mine = np.array([i for i, cell in enumerate(skin.cells) if int(cell) in local], np.int64)
     cells = np.array([local[int(skin.cells[i])] for i in mine], np.int64)
     msh = space.mesh
@@ -102,7 +102,7 @@ def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int
 def _points(
     space: fem.FunctionSpace, parents: Ints, cells: Ints, within: Floats, rest: Floats, areas: Floats
 ) -> ContactPoints:
-    """Points at ``within`` (n, 3) of the reference cell of ``cells`` (n,)."""
+    """Points at reference coordinates ``within`` (n, 3) of ``cells`` (n,)."""
     basis = _element(space).tabulate(0, within)[0, :, :, 0]
     nodes = space.dofmap.list[cells].astype(np.int64)
     dofs = np.asarray(parents, np.int64)[3 * nodes[:, :, None] + np.arange(3)]
@@ -122,7 +122,7 @@ def _element(space: fem.FunctionSpace) -> Any:
 
 
 def _sides(topology: Any, facets: Ints) -> Ints:
-    """The cell of each facet of this rank's own cells, and which of the cell's facets it is, (f, 2)."""
+    """The cell of each facet of this rank's own cells, and the facet's number in the cell, (f, 2)."""
     cells, back = topology.connectivity(2, 3), topology.connectivity(3, 2)
     own = topology.index_map(3).size_local
     beside = [(int(cells.links(facet)[0]), facet) for facet in facets]

@@ -16,7 +16,7 @@ from fem_reference.solvers.fenicsx.tabulated import Displacement, geometry
 
 @dataclass(frozen=True)
 class Smallest:
-    """The smallest det F over a set of points of the cells, and where: which kind of point, cell and rest position [mm]."""
+    """The smallest det F over a set of points of the cells, with the kind of point, the cell and the rest position [mm]."""
 
     value: float
     where: str
@@ -31,10 +31,10 @@ class Determinants:
     """Det F at the quadrature points and the vertices of this rank's cells."""
 
     def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
-        """``cells``: which cell of the body each of this rank's is; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
+        """``cells``: the cell of the body for each of this rank's; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         self.points = {"quadrature point": rule, "vertex": reference_nodes(kind, 1)}
-        # Compiled, since each iteration asks for it, and by all ranks together: one without cells evaluates it nowhere.
+        # Compiled, as each iteration needs it, and by all ranks together: a rank without cells evaluates it nowhere.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(self.points["vertex"], len(cells))
         self.rest, slopes = {}, {}
@@ -52,7 +52,7 @@ class Determinants:
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
     def smallest_of(self, values: Floats) -> Smallest:
-        """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and where; NaN is smallest."""
+        """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and its place; NaN is smallest."""
         where = "quadrature point"
         return self._least([self._mine(where, values.reshape(len(self.cells), len(self.points[where])))])
 
@@ -61,11 +61,11 @@ class Determinants:
         return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
 
     def values_now(self) -> Floats:
-        """Det F at the quadrature points of this rank's cells (p,): where the energies see it."""
+        """Det F at the quadrature points of this rank's cells (p,), where the energies are evaluated."""
         return self._at("quadrature point").ravel()
 
     def everywhere(self, good: NDArray[np.bool_]) -> bool:
-        """All of this rank's points (p,) are ``good``, and those of the others."""
+        """True where all points (p,) of all ranks are ``good``."""
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:

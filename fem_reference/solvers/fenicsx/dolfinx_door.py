@@ -1,4 +1,4 @@
-"""The import of DOLFINx: the PyPI wheel if it is there, else whatever build is installed (conda, Debian)."""
+"""The import of DOLFINx: the PyPI wheel if it is installed, else any other build (conda, Debian)."""
 
 import contextlib
 import sys
@@ -22,7 +22,7 @@ def _without(name: str) -> Iterator[bool]:
             del sys.modules[name]
 
 
-# FFCx loads numba where it is installed, for kernels that nothing here has: a quarter of the time in which a process starts.
+# FFCx imports numba where it is installed, for kernels that are not used here: a quarter of a process's start-up time.
 with _without("numba") as nowhere:
     with contextlib.suppress(ImportError):
         import dolfinx_solver  # noqa: F401 - makes the wheel's own dolfinx importable

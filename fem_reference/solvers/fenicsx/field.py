@@ -1,4 +1,4 @@
-"""Scalar fields by Lagrange elements of FEniCSx, solved in another process; this module needs no FEniCSx."""
+"""Scalar fields by Lagrange elements of FEniCSx, solved in a subprocess; this module needs no FEniCSx."""
 
 import pickle
 from contextlib import nullcontext
@@ -18,13 +18,13 @@ from fem_reference.solvers.fenicsx.session import present, session
 
 
 class FieldSettings(Record):
-    """``time_limit``: of processor time, when to give up, by default never."""
+    """``time_limit``: processor time after which to give up, by default none."""
 
     time_limit: Time | None = None
 
 
 def solve(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
-    """Solve in the process that is shared now or in one of its own; one that dies is the status *crashed*, not an exception."""
+    """Solve in the shared process or in a new one; a process that dies is the status *crashed*, not an exception."""
     require_installed()
     values = np.full(len(problem.fixed), np.nan)
 
@@ -35,7 +35,7 @@ def solve(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome
 
     shared = present()
     with scratch.folder() as folder, nullcontext(shared) if shared else session() as solver:
-        job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
+        job = folder.resolve() / "job.pickle"  # a shared process may have been started elsewhere
         job.write_bytes(pickle.dumps(problem))
         outcome = solver.run(job, settings.time_limit, take, "fields")
     sink(Frame.of_field(problem, values, problem.form))

@@ -1,4 +1,4 @@
-"""The weak form of a body, summed from its effects; symbols stand for their parameters, so that a compiled form serves many."""
+"""The weak form of a body, summed from its effects; symbols stand for parameters, so that one compiled form serves many."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -38,7 +38,7 @@ class UflFunctions:
 
 class Derivatives(NamedTuple):
     """All first derivatives of an energy at the quadrature points, and these with the upper triangle of the second ones:
-    compiled expressions of what ``cells.c`` names.
+    compiled expressions, as ``cells.c`` names them.
     """
 
     first: Any
@@ -46,18 +46,17 @@ class Derivatives(NamedTuple):
 
 
 class Form:
-    """The weak form of a body. Of the energy its ``derivatives``, with ``kinds`` variables a component of the displacement; what
-    has an amount of zero over whole frames is not in these there. ``loads`` on the surface, a residual, 0 where there are
-    none.
+    """The weak form of a body. ``derivatives``: those of the energy, with ``kinds`` variables per component of the displacement;
+    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 without.
 
-    ``energy`` that is stored as an integral, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
-    without fibres); to be set: the amounts of effects (``set_amounts``), and the ``step`` of time (None where nothing depends on
-    it), with ``kinetic`` energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
-    ``degree``; ``regions``: by name, this rank's facets.
+    ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
+    fibres). To be set: the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
+    ``kinetic``: the energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
+    ``degree``; ``regions``: this rank's facets by name.
     """
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
-        """``cells``: which cell of the body each of this rank's is."""
+        """``cells``: the cell of the body for each of this rank's."""
         self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
         self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
         self.degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
@@ -83,7 +82,7 @@ class Form:
         self.loads = self._loads(acting, state, unknowns)
 
     def set_amounts(self, frame: float) -> None:
-        """The amounts of effects at a frame, and the derivatives of those that are not zero over whole frames there."""
+        """Set the amounts of effects at a frame, and the derivatives of effects that are not zero over whole frames there."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         self.derivatives = self._made[self._quiet(frame)]
@@ -116,7 +115,7 @@ class Form:
         return self.ds(list(self.regions).index(region))
 
     def _fibre(self, body: Body, cells: Ints) -> list[Any] | None:
-        """The fibre direction at the quadrature points, where an effect asks for it."""
+        """The fibre direction at the quadrature points, where an effect needs it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
         points, weights = self.rule
@@ -130,7 +129,7 @@ class Form:
 
 
 def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int) -> tuple[Any, Any]:
-    """The measures of the cells, by a rule, and of the facets, by number of region and of a degree."""
+    """The measures of the cells, by a rule, and of the facets, by number of region and by degree."""
     points, weights = rule
     inside = {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
     kind = fem.IntegralType.exterior_facet
@@ -145,8 +144,8 @@ def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int)
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A load step that takes time: one over that, ``rate`` [1/s], the unknowns ``before`` it, and, where masses have inertia, those
-    ``predicted`` and the ``velocity``.
+    """A load step with a duration: its inverse ``rate`` [1/s], the unknowns ``before`` it, and with inertia the ``predicted``
+    ones and the ``velocity``.
     """
 
     rate: fem.Constant
@@ -165,9 +164,7 @@ def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
 
 @dataclass(frozen=True)
 class _Variables:
-    """The variables by which the energy at a point is differentiated: ``F`` and ``displacement``, and the ``pressure`` where
-    there is one.
-    """
+    """The variables of differentiation of the energy at a point: ``F``, ``displacement``, and ``pressure`` where there is one."""
 
     F: Any
     displacement: Any
@@ -216,13 +213,13 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
 
 
 def _instants(frames: tuple[float, ...]) -> list[float]:
-    """The ``frames``, and between two of them each."""
+    """The ``frames``, and the middle between each two."""
     return [*frames, *((a + b) / 2 for a, b in pairwise(frames))]
 
 
 def _differentiated(energy: Any, by: _Variables, kinds: int) -> tuple[list[Any], list[Any]]:
-    """The first derivatives of ``energy`` by all variables, of which each component of the displacement has so many ``kinds``, and
-    by the pressure; and the upper triangle of the second ones: in the order of ``cells.c``.
+    """The first derivatives of ``energy`` by all variables (``kinds`` per component of the displacement, then the pressure), and
+    the upper triangle of the second ones, in the order of ``cells.c``.
     """
     variables: list[tuple[Any, tuple[int, ...]]] = [
         (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(kinds)
@@ -242,7 +239,7 @@ def _vanishes(derivative: Any) -> bool:
 
 
 def _symbolic(effect: Effect, msh: mesh.Mesh) -> Effect:
-    """The effect with a constant of the mesh in place of each number among its parameters."""
+    """The effect with each numerical parameter replaced by a constant of the mesh."""
     values = {name: getattr(effect, name) for name in type(effect).model_fields}
     symbols: dict[str, Any] = {
         name: fem.Constant(msh, value) for name, value in values.items() if isinstance(value, float)

@@ -1,4 +1,4 @@
-"""Messages between the caller and the process that solves: jobs and frames, and what a run goes on from."""
+"""Messages between the caller and the solving process: jobs, frames, and the state from which a run continues."""
 
 import json
 from collections.abc import Mapping
@@ -18,8 +18,8 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 
 @dataclass(frozen=True)
 class Kept:
-    """The ``folder`` in which the states of a run are kept, and ``frames`` among them: it can go on from the last, with the others
-    for loads that come back. ``mesh``: its fingerprint.
+    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last one, with the
+    others for loads that return. ``mesh``: its fingerprint.
     """
 
     folder: Path
@@ -32,7 +32,7 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """The states to go on from; anything else that an earlier process left in the folder is removed."""
+    """The states to continue from; all other files that an earlier process left in the folder are removed."""
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)
@@ -51,9 +51,9 @@ def _is_of(whole: Kept, number: int) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A ``body`` and how to solve it; ``samples``: by name, the cell (n,) of each point and the points (n, 3) at rest whose
-    positions are wanted. Of a muscle there are some; then forces at edges that its attachments share are divided between them.
-    ``kept``: where states are kept, if they are.
+    """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose
+    positions are requested. Only a muscle has them, and then forces at edges shared by attachments are divided between these.
+    ``kept``: the states that are kept, if any.
     """
 
     task: ClassVar[Task] = "solve_body"
@@ -65,6 +65,6 @@ class Job:
 
 
 def stored_state(arrays: Mapping[str, Any]) -> NodalState | None:
-    """The unknowns of the cells among the ``arrays`` of a frame, None where they were not asked for."""
+    """The unknowns of the cells among the ``arrays`` of a frame, None where they were not requested."""
     own = {name.removeprefix("state "): arrays[name] for name in arrays if name.startswith("state ")}
     return NodalState.of(own) if own else None

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats
 
-# What acts is as it was where none of it differs by more (mm, and entries of a pose): rounding of a motion that comes back.
+# Loads and boundary conditions are the same if none differs by more (mm, and entries of a pose): rounding of a returning motion.
 _SAME = 1e-9
 # States are kept up to this memory [bytes] on each rank, the latest ones.
 _MOST = 512e6

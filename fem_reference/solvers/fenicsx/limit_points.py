@@ -1,4 +1,4 @@
-"""Limit points: where a path of equilibria turns back in time, and no state is near beyond."""
+"""Limit points: states at which a path of equilibria turns back in time, with no state near beyond."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ from fem_reference.solvers.fenicsx.stability import displacements, softest
 
 # The share of the smallest load step over which slopes are taken.
 _DIFFERENCE = 1e-3
-# Of the smallest load steps. One that failed was up to two of them, and the distance is known to a factor.
+# In smallest load steps. One that failed was up to two of them, and the distance is known up to a factor.
 _NEAR = 4
-_SOFT = 0.3  # The share of the stiffness at rest that the softest mode has near a limit point at most.
+_SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode keeps near a limit point.
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class LimitPoint:
 
 
 def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
-    """The limit point that follows on the last good state within a few load steps of the smallest size ``step``; None where none
-    does, or where it cannot be known. Collective.
+    """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None where there is
+    none or it cannot be known. Collective.
 
-    Before a limit point the least eigenvalue of the tangent falls as the root of what is left of the way there: its square is
-    linear, and half of it over its slope along the path is what is left. The slope is that of a step of Newton's method.
+    Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is
+    linear, and the remaining path is half of the eigenvalue over its slope along the path. The slope is that of a Newton step.
     """
     if body.stability is None or body.clock.matters:
         return None
@@ -53,7 +53,7 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
 
 def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     system, linear = body.system, body.linear
-    assert isinstance(linear, Factorised)  # where there is a stability
+    assert isinstance(linear, Factorised)  # true where there is a stability
     body.set_frame(body.at)
     system.contact = body.contact
     system.linearise()
@@ -76,7 +76,7 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
 
 
 def _stiffness_at_rest(body: AssembledBody) -> float:
-    """The least eigenvalue at rest, without contact; the state is as before, but for the tangent."""
+    """The least eigenvalue at rest, without contact; the state is restored, except for the tangent."""
     now, body.system.contact = np.array(body.unknowns.x.array), None
     body.unknowns.x.array[:] = 0
     body.system.linearise()
@@ -89,7 +89,7 @@ def _stiffness_at_rest(body: AssembledBody) -> float:
 
 
 def _motion(body: AssembledBody, difference: float) -> Floats:
-    """The change of the unknowns (n,) from the present state over a small ``difference`` in frames, to first order."""
+    """The first-order change of the unknowns (n,) from the present state over a small ``difference`` in frames."""
     system, frame = body.system, body.at + difference
     body.set_frame(frame)
     moves = -system.missing()
@@ -106,14 +106,14 @@ def _motion(body: AssembledBody, difference: float) -> Floats:
 
 
 def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
-    """Twice the energy of a ``mode`` by the tangent as it is."""
+    """Twice the energy of a ``mode`` by the present tangent."""
     image = mode.duplicate()
     body.system.matrix.mult(mode, image)
     return float(image.dot(mode))
 
 
 def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
-    """The rest position [mm] where a mode moves most."""
+    """The rest position [mm] at which a mode moves most."""
     lengths = np.linalg.norm(displacements(mode, body.system, body.displacement.dofs), axis=1)
     i = int(np.argmax(lengths))
     place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()

@@ -1,4 +1,4 @@
-"""Systems of linear equations: by a sparse factorisation (MUMPS), which serves as long as it is a good preconditioner."""
+"""Linear systems solved with a sparse factorisation (MUMPS), which serves as long as it is a good preconditioner."""
 
 from itertools import count
 from typing import Protocol
@@ -8,42 +8,42 @@ from petsc4py import PETSc
 
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# What MUMPS calls its entries: its error; negative pivots; the last front, by one process, else those of it are not counted; by how
-# much more memory than it estimates it may take, in per cent.
+# Numbers of MUMPS's entries: its error; negative pivots; the last front on one process, as its pivots are not counted otherwise;
+# the memory that it may take beyond its estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
-_FLOPS, _ENTRIES = 3, 29  # of its numbers after a factorisation, the former among the real ones
-# Above this size factors are compressed, block by block (BLR), up to an error of 1e-5: half the time of a factorisation at 170 000
-# unknowns, nothing gained at 16 000. What MUMPS calls that.
+_FLOPS, _ENTRIES = 3, 29  # entries after a factorisation, the former among the real ones
+# Above this size factors are compressed by blocks (BLR), up to an error of 1e-5: half the time of a factorisation at 170 000
+# unknowns, no gain at 16 000. MUMPS's name of it:
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
-# A factorisation takes as long as that many of its operations by entry, of a back-substitution: measured on meshes of 16 000 and of
-# 200 000 unknowns.
+# A back-substitution takes as long, per entry of the factors, as that many operations of a factorisation: measured on meshes of
+# 16 000 and of 200 000 unknowns.
 _OPERATIONS = 22.0
-_LEAST, _MOST = 12, 80  # Krylov iterations that an old factorisation may take, whatever its size
-_INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # by which single precision is put to the test
-_EXACT = 1e-10  # a relative residual that leaves Newton's method quadratic
+_LEAST, _MOST = 12, 80  # Krylov iterations that an old factorisation may take, at any size
+_INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
+_EXACT = 1e-10  # a relative residual with which Newton's method stays quadratic
 _number = count()
 
 
 class LinearSolveError(ArithmeticError):
-    """The tangent is singular, or there is no memory to factorise it."""
+    """The tangent is singular, or memory does not suffice to factorise it."""
 
 
 class LinearSolver(Protocol):
     """Solves with a matrix that changes."""
 
     def changed(self) -> None:
-        """The matrix is another now."""
+        """Note that the matrix has changed."""
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
 
     def solve_exactly(self) -> bool:
-        """Solve each system exactly from now on; True where that is another way than until now."""
+        """Solve each system exactly from now on; True where that is a change."""
 
 
 class Factorised:
-    """Solves with the ``matrix`` as it is now. With ``lagged`` by FGMRES with a factorisation of it as it was: where that took
-    longer than a new factorisation, in one system or in all since, there is one. LDL^T of a symmetric matrix, else LU.
+    """Solves with the present ``matrix``. With ``lagged`` by FGMRES with an older factorisation; where that took longer than a
+    new one, in one system or in all since, the matrix is factorised again. LDL^T of a symmetric matrix, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -52,7 +52,7 @@ class Factorised:
         self._choose(precision)
         self.fresh = self.there = False
         self.limit = _LEAST
-        self.since = 0  # Krylov iterations since the last factorisation, with another matrix
+        self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
 
     def _choose(self, precision: str) -> None:
         self.precision = precision
@@ -66,7 +66,7 @@ class Factorised:
         self.preconditioner.setFactorSolverType("mumps")
         PETSc.Options().setValue(
             f"{self.krylov.getOptionsPrefix()}pc_precision", precision
-        )  # read when it factorises first
+        )  # read at its first factorisation
         self.krylov.setFromOptions()
         self.preconditioner.setFactorSetUpSolverType()
         self.factors = self.preconditioner.getFactorMatrix()
@@ -77,11 +77,11 @@ class Factorised:
             self.factors.setMumpsCntl(_DROPPED, 1e-5)
 
     def changed(self) -> None:
-        """The matrix is another now."""
+        """Note that the matrix has changed."""
         self.fresh = False
 
     def solve_exactly(self) -> bool:
-        """Factorise each matrix from now on, in double precision; True where that is another way than until now."""
+        """Factorise each matrix from now on, in double precision; True where that is a change."""
         if not self.lagged:
             return False
         self.lagged = self.fresh = self.there = False
@@ -90,7 +90,7 @@ class Factorised:
         return True
 
     def factorise(self) -> None:
-        """Factorise the matrix as it is. ``LinearSolveError`` where that cannot be done."""
+        """Factorise the present matrix; ``LinearSolveError`` where this fails."""
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
@@ -109,10 +109,10 @@ class Factorised:
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if that cannot be done."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` where this fails."""
         if not self.lagged:
             tolerance = _EXACT
-        # One that took as long as a new one takes, in all, is given up: at most twice the time of whoever knew what comes.
+        # A factorisation whose iterations took as long as a new one is replaced: at most twice the time of perfect foresight.
         serves = self.fresh or (self.lagged and self.since < self.limit)
         if self.there and serves and self._iterate(b, x, tolerance, self.limit):
             return
@@ -130,9 +130,8 @@ class Factorised:
         return bool(self.krylov.is_converged)
 
     def negative_pivots(self) -> int:
-        """The negative pivots of the matrix as it is, factorised where it is not yet. Where single precision does not resolve the
-        directions in which the matrix is softest, double precision is used from then on. ``LinearSolveError`` where it cannot
-        be factorised.
+        """The negative pivots of the present matrix, which is factorised if necessary. Where single precision does not resolve
+        the softest directions, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
         """
         if not self.fresh:
             self.factorise()
@@ -142,8 +141,8 @@ class Factorised:
         return int(self.factors.getMumpsInfog(_NEGATIVE))
 
     def _resolved(self) -> bool:
-        """True where the factorisation M is the matrix A in the softest directions too: in a vector v, which inverse iteration
-        turned towards them, M^-1 A v is v but for a tenth. So none of them can have another sign in M.
+        """True where the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them
+        by inverse iteration, M^-1 A v equals v up to a tenth. So none of them can have another sign in M.
         """
         random = np.random.default_rng(self.matrix.comm.rank)
         image = self.matrix.createVecLeft()

@@ -1,4 +1,4 @@
-"""A body's mesh in DOLFINx: over the ranks, with its regions found again, its unknowns, and its nodes' positions."""
+"""A body's mesh in DOLFINx: distributed over ranks, with its regions, its unknowns and the positions of its nodes."""
 
 import basix
 import basix.ufl
@@ -12,7 +12,7 @@ from fem_reference.solvers.fenicsx.tabulated import Displacement
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
-    """The mesh over the ranks; the first one brings it."""
+    """The mesh, distributed over the ranks; the first rank provides it."""
     element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
     nodes = basix.create_element(basix.ElementFamily.P, basix.CellType[cells.kind], cells.degree, _VARIANT).points
     ours = reference_nodes(cells.kind, cells.degree)
@@ -32,7 +32,7 @@ _VARIANT = basix.LagrangeVariant.gll_warped
 
 
 def local_facets(msh: mesh.Mesh, facets: dict[str, Ints]) -> dict[str, Ints]:
-    """This rank's facets of each region, among corners (f, 3 or 4) given by the points of the body's mesh."""
+    """This rank's facets of each region; the corners (f, 3 or 4) are points of the body's mesh."""
     for start, end in ((2, 3), (2, 0), (0, 3), (3, 0), (3, 2)):
         msh.topology.create_connectivity(start, end)
     exterior = mesh.exterior_facet_indices(msh.topology)
@@ -52,7 +52,7 @@ def _corners(msh: mesh.Mesh, facets: Ints) -> Ints:
 
 
 def _original_points(msh: mesh.Mesh) -> Ints:
-    """The point of the body's mesh at each vertex of this rank."""
+    """The point of the body's mesh for each vertex of this rank."""
     connected = msh.topology.connectivity(3, 0)
     corners = connected.array.reshape(connected.num_nodes, 4 if msh.topology.cell_name() == "tetrahedron" else 8)
     points = np.full(msh.topology.index_map(0).size_local + msh.topology.index_map(0).num_ghosts, -1, np.int64)
@@ -61,7 +61,7 @@ def _original_points(msh: mesh.Mesh) -> Ints:
 
 
 class Nodes:
-    """The nodes of the body's mesh and where a displacement takes them."""
+    """The nodes of the body's mesh, moved by a displacement."""
 
     def __init__(self, cells: Cells, own: Ints, displacement: Displacement) -> None:
         """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""

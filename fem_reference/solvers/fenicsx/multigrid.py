@@ -1,8 +1,8 @@
-"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1.
+"""Linear systems too large for a factorisation: FGMRES with two levels of elements, P2 and P1.
 
-The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). For the displacement: one
-cycle between the quadratic element and the linear one on the same cells, smoothed by Chebyshev polynomials, the coarse level
-factorised. For the pressure: the mass matrix over local stiffness, to which the Schur complement is spectrally equivalent
+The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). Displacement block: one
+cycle between the quadratic and the linear element on the same cells, with Chebyshev smoothing and a factorised coarse level.
+Pressure block: the mass matrix over local stiffness, which is spectrally equivalent to the Schur complement
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
@@ -18,7 +18,7 @@ from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
 _SMOOTHING = 2  # the degree of the polynomial
-_MOST = 200  # iterations; and how many more than with a fresh preconditioner are worth it
+_MOST = 200  # iterations; also the excess over a fresh preconditioner that is still accepted
 _STALE = 15
 
 
@@ -44,10 +44,10 @@ class Multigrid:
         self.stale, self.first = True, 0
 
     def changed(self) -> None:
-        """The matrix is another now; the preconditioner serves on."""
+        """Note that the matrix has changed; the preconditioner remains in use."""
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
         fresh = self.stale
         if fresh:
             self._renew()
@@ -63,7 +63,7 @@ class Multigrid:
             raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
 
     def solve_exactly(self) -> bool:
-        """It cannot: there is no memory for a factorisation."""
+        """False: memory does not suffice for a factorisation."""
         return False
 
     def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> bool:
@@ -74,7 +74,7 @@ class Multigrid:
         return bool(self.krylov.is_converged)
 
     def _renew(self) -> None:
-        """The preconditioner of the matrix as it is."""
+        """Build the preconditioner of the present matrix."""
         with self.spent.on("factorisation"):
             stiff, coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
             self.blocks.renew(stiff, coupling, self._cycle(stiff), self._mass())
@@ -106,8 +106,8 @@ class Multigrid:
         return cycle
 
     def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
-        """The interpolation from the linear element to the quadratic one on the same cells, 0 where something is prescribed; and
-        the unknowns of the former that are: those at corners where one of the latter is.
+        """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the
+        unknowns of the linear element that are free: those at corners where one of the quadratic element is.
         """
         cells, system = self.system.cells, self.system
         kind, degree, _ = ELEMENTS[element]
@@ -159,13 +159,13 @@ class _Blocks:
         self.sets = sets
 
     def renew(self, stiff: PETSc.Mat, coupling: PETSc.Mat, cycle: PETSc.PC, mass: PETSc.PC) -> None:
-        """Take other blocks: of the tangent, and solvers for the displacement and the pressure."""
+        """Replace the blocks: those of the tangent, and the solvers for displacement and pressure."""
         self.coupling, self.cycle, self.mass = coupling, cycle, mass
         self.displaced, self.moved = stiff.createVecRight(), stiff.createVecRight()
         self.pressed = coupling.createVecRight()
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """First the pressure, by what the volumes ask; then the displacement, by what is left of the forces."""
+        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
         forces, volumes = x.getSubVector(self.sets[0]), x.getSubVector(self.sets[1])
         self.mass.apply(volumes, self.pressed)
         self.pressed.scale(-1.0)

@@ -1,4 +1,4 @@
-"""Newton's method: inexact where exactness is not worth its time, and damped where a full step would turn a cell inside out."""
+"""Newton's method: inexact where exactness costs more than it saves, and damped where a full step would invert a cell."""
 
 import numpy as np
 
@@ -12,20 +12,20 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
-# A step is halved until det F keeps this share of itself everywhere, or down to this length, where its next state is looked at.
+# A step is halved until det F keeps this share of itself everywhere, or down to this length, at which its next state is checked.
 _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, its factor and its bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
-# It is given up where in so many iterations the residual did not fall to this share of its best before.
+# Newton gives up if within so many iterations the residual did not fall to this share of its earlier best.
 _PATIENCE, _PROGRESS = 6, 0.5
-# Where a linear solution would end below what Newton's method has to reach, it goes on to this share of it: what is left of the
-# last system is what is left of all.
+# Where a linear solution would end below the target of Newton's method, it continues to this share of the target: the residual
+# of the last system is the residual of all.
 _PAST = 1e-2
 
 
 class Newton:
-    """Newton's method on a ``system``, by full steps of ``linear``; a line search would weigh forces [N] against volumes [mm3]: it
-    stalls where bodies bend or are soft.
+    """Newton's method on a ``system``, by full steps of ``linear``. A line search would weigh forces [N] against volumes [mm3],
+    and it stalls where bodies bend or are soft.
     """
 
     def __init__(
@@ -37,9 +37,9 @@ class Newton:
         self.thrown = 0
 
     def solve_among(self, contact: ContactForces | None, frame: float) -> Attempt:
-        """Solve as ``solve`` does; at first without ``contact`` where nothing is pressed in the state that is there. That stands
-        where it converged and nothing is pressed either: then it is what would have been found with contact. Else it is thrown
-        away, and its iterations, which are no sign of how hard the load step is, count as ``thrown``.
+        """Solve as ``solve`` does; first without ``contact`` where the present state has no contact pressure. That result stands
+        where it converged without contact pressure: contact would give the same one. Else it is discarded, and its iterations
+        count as ``thrown``, as they are no sign of how hard the load step is.
         """
         system, before = self.system, np.array(self.system.unknowns.x.array)
         system.contact = contact if contact and contact.presses() else None
@@ -56,7 +56,7 @@ class Newton:
         return self.solve(frame)
 
     def solve(self, frame: float) -> Attempt:
-        """Solve at ``frame``. It ends where every step turns a cell inside out."""
+        """Solve at ``frame``. The attempt ends where every step inverts a cell."""
         smallest, last = self.determinants.values_now(), np.nan
         residuals = [self._begin(frame)]
         while not residuals[-1] <= self.residual or self.system.lacking():
@@ -79,7 +79,7 @@ class Newton:
         return Attempt("converged", len(residuals) - 1, tuple(residuals))
 
     def _hopeless(self, residuals: list[float]) -> str | None:
-        """The reason to iterate no more after ``residuals``, None where there is none."""
+        """The reason to stop iterating after ``residuals``, None where there is none."""
         iterations = len(residuals) - 1
         if not np.isfinite(residuals[-1]):
             return f"went where a law, or what is prescribed, has no value in {iterations} iterations"
@@ -90,14 +90,14 @@ class Newton:
         return None
 
     def _failed(self, residuals: list[float], why: str) -> Attempt:
-        """The record of an attempt that failed: inverted where det F is not positive in the state that it ended with."""
+        """The record of a failed attempt: inverted where det F is not positive in its last state."""
         status: Status = "diverged" if self.determinants.smallest().value > 0 else "inverted"
         return Attempt(status, len(residuals) - 1, tuple(residuals), f"Newton's method {why}")
 
     def _begin(self, frame: float) -> float:
-        """Make the first iteration's system. Bones at their next poses would meet points that have not moved yet, and forces
-        without meaning would lead it astray: it starts from the contact pressures of the last state, and is linear in the
-        motion of the bones.
+        """Assemble the first iteration's system. Bones at their next poses would meet points that have not moved yet, and
+        meaningless forces would mislead it. So it uses the contact pressures of the last state, and is linear in the motion of
+        the bones.
         """
         moves = -self.system.missing()
         if self.system.contact is None:
@@ -118,20 +118,18 @@ class Newton:
             self.system.contact.update(frame)
 
     def _tolerance(self, norm: float, last: float) -> float:
-        """The tolerance of the linear system whose right-hand side has a ``norm``, relative to it; ``last`` is the norm of the one
-        before.
-        """
+        """The tolerance of the linear system, relative to the ``norm`` of its right-hand side; ``last`` is the previous norm."""
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        # Pressures weigh less in linear systems.
+        # Pressures have less weight in linear systems.
         enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)
         return max(wanted, 1e-13)
 
     def _take(self, smallest: Floats) -> Floats:
-        """Take the step, or as much of it as det F allows; det F afterwards."""
+        """Take the step, shortened as det F requires; det F afterwards."""
         unknowns, owned = self.system.unknowns.x, self.system.owned
         before, share = np.array(unknowns.array), 1.0
         step = np.where(self.system.fixed, self.system.missing(), 0.0)
@@ -147,7 +145,7 @@ class Newton:
 
 
 def stalled(residuals: list[float]) -> int:
-    """The number of the last ``residuals`` since one fell to half of the best before it.
+    """The number of the last ``residuals`` since one fell to half of the earlier best.
 
     >>> stalled([1.0]), stalled([1.0, 0.4, 0.1]), stalled([1.0, 0.4, 0.3, 2.0])
     (0, 0, 2)

@@ -1,4 +1,4 @@
-"""The unknowns of a body's cells, in an order that can be read without FEniCSx."""
+"""The unknowns of a body's cells, in an order that readers without FEniCSx understand."""
 
 import numpy as np
 

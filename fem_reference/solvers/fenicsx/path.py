@@ -1,4 +1,4 @@
-"""Signs of a jump between the states that a body took one after the other; they ask for no other solution."""
+"""Signs of a jump between successive states of a body; no other solution is needed."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -15,15 +15,16 @@ from fem_reference.solvers.fenicsx.system import System
 if TYPE_CHECKING:
     from fem_reference.solvers.fenicsx.body import AssembledBody
 
-# On the straight line from one state to the next det F, a cubic of the share of the way, keeps this share of the less of both ends.
-# A turn by 143 degrees within a step takes it to a tenth; half a turn, or a way through a mirrored state, to 0 or below.
+# On the straight line from one state to the next, det F, a cubic of the share of the line, keeps this share of the
+# lesser end value. A turn by 143 degrees within a step reduces it to a tenth; half a turn, or a mirrored state on the
+# line, to 0 or below.
 KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
-_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # takes values at these shares to the coefficients of a cubic
+_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
 
 
 class Path:
-    """The states of a ``system``, one after the other. Its methods are collective."""
+    """The successive states of a ``system``. Its methods are collective."""
 
     def __init__(self, system: System, determinants: Determinants) -> None:
         self.system, self.determinants = system, determinants
@@ -31,8 +32,8 @@ class Path:
         self.unknowns, self.forces = np.array(system.unknowns.x.array), self.system.reactions(inside=True)
 
     def jumped(self, before: Floats) -> Smallest | None:
-        """The least det F, as a share of itself, on the straight line from the unknowns ``before`` to those at present; None where
-        it is not next to nothing. A body that deforms steadily in small steps never gets there.
+        """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones;
+        None unless it is next to nothing. A body that deforms steadily in small steps never gets there.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -54,14 +55,14 @@ class Path:
         return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of itself, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
-        """The state at present, with an ``energy`` [N mm] of what acts inside, is the next one; where it is ``connected`` with the
-        one before, what the energy grew by is compared with the work of the forces inside, by the trapezoidal rule.
+        """Take the present state as the next one, with the stored ``energy`` [N mm]; where it is ``connected`` with the one
+        before, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
-        The rule is exact where forces change in proportion to the displacement, and its error falls with the square of the
-        step: a law that stiffens, or a turn, is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP``
-        a state ``halfway`` is found (whether it could be; the unknowns are those of it then, and as they were afterwards), and the
-        rule is Simpson's, whose error falls with the fourth power. Of a body that jumped, the energy has fallen without work, by
-        any rule. ``gap`` is the greatest difference since it was taken, over the greatest energy so far.
+        The rule is exact where forces are linear in the displacement, and its error falls with the square of the step: for a law
+        that stiffens, or a rotation, it is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` a
+        state ``halfway`` is solved for (the function says if it was found; the unknowns are its own then, and restored
+        afterwards), and Simpson's rule applies, whose error falls with the fourth power. In a jump the energy falls without work,
+        by any rule. ``gap`` is the greatest difference since it was taken, over the greatest energy so far.
         """
         states = [
             (self.unknowns, self.forces),
@@ -78,8 +79,8 @@ class Path:
         self.energy, (self.unknowns, self.forces) = energy, states[-1]
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
-        """The growth of the energy up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
-        are two, or three at equal distances of time.
+        """The growth of the energy without work up to the last of ``states`` (unknowns and forces), over the greatest so far;
+        there are two states, or three at equal distances of time.
         """
         own = self.system.owned
         work = sum(float(np.dot(forces[:own], moves[:own])) for forces, moves in _products(states))
@@ -87,14 +88,14 @@ class Path:
         return (energy - self.energy - work) / self.greatest
 
     def take_gap(self) -> float:
-        """The gap, which is 0 from now on."""
+        """The gap, which is reset to 0."""
         gap, self.gap = self.gap, 0.0
         return gap
 
 
 def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
-    """Take the present state of a ``body`` as that of ``frame``; ``before`` (n,) are the unknowns of the one that it was solved
-    from, as one halfway is where work and energy do not agree.
+    """Take the present state of a ``body`` as that of ``frame``. ``before`` (n,) are the unknowns at the start of its step, from
+    which a halfway state is solved where work and energy disagree.
     """
     after, contact, looked = np.array(body.unknowns.x.array), body.system.contact, list[float]()
 
@@ -120,8 +121,8 @@ def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
 
 
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
-    """Forces, and the displacements along which they work: of straight lines between two ``states``, or of parabolas over time
-    through three, along which the integral is that of Simpson's rule, which is exact for them.
+    """Forces, and the displacements along which they work: straight lines between two ``states``, or parabolas over time through
+    three. Along these the integral is that of Simpson's rule, which is exact for them.
     """
     if len(states) == 2:
         (start, first), (end, last) = states
@@ -132,7 +133,7 @@ def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]
 
 
 def least(values: Floats) -> Floats:
-    """The least value (p,) from 0 to 1 of the cubics that have ``values`` (4, p) at 0, 1/3, 2/3 and 1.
+    """The least value (p,) from 0 to 1 of the cubics with ``values`` (4, p) at 0, 1/3, 2/3 and 1.
 
     >>> abs(least(np.array([[1.0], [1 / 9], [1 / 9], [1.0]]))).round(12).tolist()
     [0.0]
@@ -141,7 +142,7 @@ def least(values: Floats) -> Floats:
     found = np.minimum(values[0], values[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b**2 - 3 * a * c)
-        # The turning points; the second form of each holds where the cubic is next to none.
+        # The turning points; each has a second form that holds where the cubic term is next to none.
         turns = [-c / (b + root), -c / (b - root), (-b + root) / (3 * a), (-b - root) / (3 * a)]
     for turn in turns:
         inside = np.isfinite(turn) & (turn > 0) & (turn < 1)

@@ -1,4 +1,4 @@
-"""The worker processes of FEniCSx: whether there can be any, one that runs, what it reports, and how it ended."""
+"""The worker processes of FEniCSx: installation check, a running process, its events and its outcome."""
 
 import importlib.util
 import json
@@ -25,12 +25,12 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-PATIENCE = 5.0  # [s] until a process that was asked to end is killed
-# Times a limit of processor time, and what starting takes, that the clock may show: longer than that a machine is too busy to say
-# anything.
+PATIENCE = 5.0  # [s] from the request to end a process until it is killed
+# Clock time that may pass, as a multiple of a limit of processor time and of the start-up: beyond it the machine is too busy
+# for any conclusion.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s]
-MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
+MARK = "@fem_reference "  # begins each line of the worker's output that is meant for the caller
 
 
 def installed() -> bool:
@@ -39,7 +39,7 @@ def installed() -> bool:
 
 
 def require_installed() -> None:
-    """MissingSoftware where FEniCSx is not installed."""
+    """Raise MissingSoftware where FEniCSx is not installed."""
     if not installed():
         raise MissingSoftware(
             "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
@@ -47,11 +47,11 @@ def require_installed() -> None:
 
 
 class Process:
-    """A running ``process``, whose error output is read as it comes."""
+    """A running ``process``; its error output is read continuously."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.process = process
-        self.overran: tuple[Status, str] | None = None  # what ended it, where that was a time limit
+        self.overran: tuple[Status, str] | None = None  # the reason where a time limit ended it
         self.errors: list[str] = []
         self.listener = threading.Thread(target=self._listen)
         self.listener.start()
@@ -61,14 +61,14 @@ class Process:
         self.errors.extend(line for line in self.process.stderr if line.strip())
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """The events that it reports, until its output ends."""
+        """The reported events, until its output ends."""
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if line.startswith(MARK):
                 yield json.loads(line.removeprefix(MARK))
 
     def ending(self, kept: str) -> Outcome:
-        """The outcome where it ended without a report; ``kept`` says what there is all the same."""
+        """The outcome where it ended without a report; ``kept`` states what remains nevertheless."""
         code = self.process.wait()
         self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:
@@ -77,12 +77,12 @@ class Process:
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
-        """The line of its error output that says most: the last that names an error, else the last."""
+        """The most informative line of its error output: the last that names an error, else the last."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a word"])[-1].strip()
 
     def feed(self, line: str) -> None:
-        """Write a line to its standard input; one that died does not read it, which its exit shows."""
+        """Write a line to its standard input; a dead process does not read it, and its exit status shows that."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.write(f"{line}\n")
@@ -90,8 +90,8 @@ class Process:
 
     @contextmanager
     def limited(self, time_limit: float | None) -> Iterator[None]:
-        """End it where what is done meanwhile takes any process of it longer than ``time_limit`` [s] of processor time, whatever
-        else the machine does; ``CLOCK`` times that by the clock ends it too, which says nothing of what was done.
+        """End it where one of its processes meanwhile takes more than ``time_limit`` [s] of processor time, independent of other
+        load on the machine. ``CLOCK`` times that by the clock ends it too, without a conclusion about the work.
         """
         if time_limit is None:
             yield
@@ -103,7 +103,7 @@ class Process:
             yield
         finally:
             done.set()
-            watching.join()  # where it has begun to end the process, that is over after this
+            watching.join()  # if it has begun to end the process, that is over after this
 
     def _watch(self, time_limit: float, done: threading.Event) -> None:
         begin, before = time.monotonic(), processor_times(self.process.pid)
@@ -123,7 +123,7 @@ class Process:
         self.end()
 
     def end(self) -> None:
-        """End it: ask again and again, as mpiexec ignores a signal that comes before its own processes; at last kill it."""
+        """End it: ask repeatedly, as mpiexec ignores a signal before its own processes start; kill it in the end."""
         asked = time.monotonic()
         while self.process.poll() is None:
             patient = time.monotonic() - asked < PATIENCE
@@ -141,7 +141,7 @@ def _stalled(passed: float, used: float, time_limit: float) -> str:
 
 @contextmanager
 def running(command_line: list[str], time_limit: float | None, *, fed: bool = False) -> Iterator[Process]:
-    """The process that ``command_line`` starts; it has ended when this does. One that is ``fed`` reads lines from us until then."""
+    """The process that ``command_line`` starts, ended on exit. A ``fed`` process reads lines from the caller until then."""
     process = subprocess.Popen(
         command_line,
         stdin=subprocess.PIPE if fed else subprocess.DEVNULL,

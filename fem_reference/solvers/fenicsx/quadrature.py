@@ -6,10 +6,10 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import ELEMENTS
 
-# By element: the degree up to which polynomials are integrated exactly on a straight cell.
+# By element: the degree up to which polynomials on a straight cell are integrated exactly.
 DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
 
-# Share of the volume and barycentric coordinate of the orbits of a rule of degree 5 with the vertices among its points.
+# Shares of the volume and barycentric coordinates of the orbits of a rule of degree 5 that includes the vertices.
 _VERTEX_SHARE = 0.002
 _ON_MEDIANS = ((0.11990832171874463, 0.3141518976943535), (0.09393542311163477, 0.10944719170192463))
 _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
@@ -18,9 +18,9 @@ _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
 def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
     """Points (q, 3) and weights (q,) on the reference cell of an element, of ``degree`` or, where it is None, of ``DEGREE``.
 
-    On quadratic tetrahedra the latter has the vertices among its points: there det F of a quadratic displacement is smallest in
-    a cell that turns inside out, and an energy that grows beyond bounds as det F falls to zero keeps it positive where it is
-    looked at. Rules of the shelf leave the vertices out.
+    On quadratic tetrahedra the default rule includes the vertices. There det F of a quadratic displacement is smallest in an
+    inverting cell, and an energy that grows without bound as det F falls to zero keeps it positive where it is evaluated.
+    Standard rules leave the vertices out.
     """
     kind, order, _ = ELEMENTS[element]
     if degree is None and kind == "tetrahedron" and order == 2:

@@ -1,4 +1,4 @@
-"""The forces that keep a body where it is: what acts at its boundary, and by how much. Collective."""
+"""The reaction forces of a body: at its constraints and on its bones. Collective."""
 
 import numpy as np
 from mpi4py import MPI
@@ -12,9 +12,9 @@ Forces = dict[str, Floats]
 
 
 def reactions(system: System, contact: ContactForces | None, *, divided: bool) -> tuple[Forces, Forces]:
-    """The force (3,) [N], by name of what is prescribed in a ``system`` and of bones in ``contact``, that keeps it there, and its
-    moment (3,) [N mm] about the origin. What an unknown of several regions takes is ``divided`` between them, so that all forces
-    are in balance, or counts in each.
+    """By name of each constraint in a ``system`` and of each bone in ``contact``, the force (3,) [N] on the body and its moment
+    (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
+    balance, or counts in each.
     """
     residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
     shared = np.zeros(len(now), np.int64)

@@ -1,4 +1,4 @@
-"""Unknowns and memory that a solution takes, memory and free cores that the machine has; needs no FEniCSx."""
+"""Unknowns and memory of a solution; free memory and idle cores of the machine. Needs no FEniCSx."""
 
 import os
 import time
@@ -12,30 +12,30 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
-# Unknowns below which a factorisation costs no more than a few iterations of anything else.
+# Below this number of unknowns a factorisation costs no more than a few iterations of any other solver.
 SMALL = 4000
-# Unknowns from which on multigrid is faster than a factorisation a frame.
+# From this number of unknowns on, multigrid is faster than one factorisation per frame.
 LARGE = 350_000
-# Megabytes of a process without a body, of each unknown beside factors (with multigrid, all), and of factors in double precision
-# of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to 560 000 unknowns. MUMPS allocates more
-# than it uses.
+# Megabytes of a process without a body, of each unknown besides factors (with multigrid, of each unknown in all), and
+# of factors in double precision of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to
+# 560 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 9.5e-3, 60.0, 1.38
-# The most bytes of states, of all frames, that a run keeps without being asked to.
+# The most bytes of states, over all frames, that a run keeps by default.
 MOST_STATES = 2**26
-# From so many unknowns on a second rank pays, where a core is free for it.
+# From this number of unknowns on, a second rank pays, where a core is free for it.
 _WORTH_RANKS = 20_000
-_GLANCE = 0.2  # [s] for which is looked how busy the cores are
+_GLANCE = 0.2  # [s] over which the load of the cores is measured
 
 
 def unknowns(cells: Cells, element: str) -> int:
-    """The number of unknowns of a body of ``cells`` with an ``element``, about: every edge has a node of a quadratic one."""
+    """The approximate number of unknowns of a body of ``cells`` with an ``element``; a quadratic one has a node on every edge."""
     kind, degree, pressure = ELEMENTS[element]
     corners = cells.cells[:, : 4 if kind == "tetrahedron" else 8]
     count = len(np.unique(corners))
     pressures = {None: 0, 0: len(corners), 1: count}[pressure]
     if degree == 2:
         if kind == "hexahedron":
-            count *= 8  # as many edges, faces and cells as fill a grid
+            count *= 8  # as many edges, faces and cells as in a large grid
         else:
             pairs = np.concatenate([np.sort(corners[:, pair], axis=1) for pair in combinations(range(4), 2)])
             count += len(np.unique(pairs[:, 0].astype(np.int64) * (corners.max() + 1) + pairs[:, 1]))
@@ -43,7 +43,7 @@ def unknowns(cells: Cells, element: str) -> int:
 
 
 def state(cells: Cells, element: str, *, steps: bool) -> int:
-    """Bytes of the state of ``cells`` at a frame; ``steps``: with what the last load step started from."""
+    """Bytes of the state of ``cells`` at a frame; ``steps``: with the start of the last load step."""
     kind, degree, pressure = ELEMENTS[element]
     nodes, corners = (len(reference_nodes(kind, order)) for order in (degree, 1))
     pressures = {None: 0, 0: 1, 1: corners}[pressure]
@@ -51,7 +51,7 @@ def state(cells: Cells, element: str, *, steps: bool) -> int:
 
 
 def memory(count: int, solver: str, precision: str) -> float:
-    """Megabytes that a solution of ``count`` unknowns takes, about."""
+    """The approximate memory [MB] of a solution of ``count`` unknowns."""
     if solver == "multigrid":
         return _EMPTY + _EACH_MULTIGRID * count
     factors = _FACTORS * float((count / 16_000) ** _POWER)
@@ -59,7 +59,7 @@ def memory(count: int, solver: str, precision: str) -> float:
 
 
 def available() -> float:
-    """Megabytes that are free, as the system has it; infinite where it does not say."""
+    """The free memory [MB] that the system reports; infinite where it reports none."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("MemAvailable"))
@@ -68,8 +68,8 @@ def available() -> float:
 
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
-    """The settings with a solver of linear systems and its precision: those asked for, or what the size asks for and what fits into
-    the ``free`` megabytes. InputError where nothing does.
+    """The settings with a linear solver and its precision: the requested ones, or those that the size suggests and that fit into
+    the ``free`` megabytes. InputError where nothing fits.
     """
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
@@ -83,7 +83,7 @@ def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
 
 
 def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "multigrid"]]:
-    """The solvers of linear systems for an ``element`` and so many unknowns, the one to be preferred first."""
+    """The linear solvers for an ``element`` and this number of unknowns, the preferred one first."""
     _, degree, pressure = ELEMENTS[element]
     if count < SMALL:
         return ["direct"]
@@ -93,7 +93,7 @@ def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "mult
 
 
 def idle_cores() -> int:
-    """The number of idle cores among those that this process may use; all of them where the system does not say."""
+    """The number of idle cores among those of this process; all of them where the system does not report it."""
     mine = os.sched_getaffinity(0)
     before = _idle(mine)
     if before is None:
@@ -106,7 +106,7 @@ def idle_cores() -> int:
 
 
 def _idle(cores: set[int]) -> float | None:
-    """Ticks of the clock for which ``cores`` have been idle since the system started."""
+    """The clock ticks for which ``cores`` have been idle since the system started."""
     try:
         lines = Path("/proc/stat").read_text(encoding="utf-8").splitlines()
         fields = {line.split()[0]: line.split() for line in lines}

@@ -1,4 +1,4 @@
-"""The states of a run on disk, bit by bit: a process that finds them goes on as the one that wrote them would have done.
+"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have done.
 
 <run>/restart/layout_<hash>.npz   by rank: its cells, and the unknowns of each
 /frame_0010.npz      by rank: the unknowns and the arrays of the clock; ``facts``, in JSON
@@ -17,19 +17,19 @@ from fem_reference.solvers.fenicsx.jobs import Kept
 
 
 class Restart:
-    """Writes and reads the states of a ``body``; collective. The number of ranks may be another when they are read."""
+    """Writes and reads the states of a ``body``; collective. The number of ranks may differ when they are read."""
 
     def __init__(self, body: AssembledBody, kept: Kept) -> None:
         self.body, self.kept = body, kept
         dofmap = body.unknowns.function_space.dofmap
         names = np.asarray(dofmap.list, np.int64)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, those that it shares too
+        self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, shared ones too
         self.cells = np.asarray(body.mesh.topology.original_cell_index, np.int64)[: len(names)]
         self.layout = self._layout()
-        self.note = ""  # on a run that goes on with other effects
+        self.note = ""  # on a run that continues with other effects
 
     def _layout(self) -> str:
-        """The name of the file of how unknowns are distributed."""
+        """The name of the file with the distribution of the unknowns."""
         own = len(self.body.cells)
         arrays = self._gathered({"cells": self.cells[:own], "dofs": self.dofs[:own]})
         name = f"layout_{fingerprint(*arrays.values())[:16]}.npz"
@@ -38,7 +38,7 @@ class Restart:
         return name
 
     def _gathered(self, mine: dict[str, Any]) -> dict[str, Any]:
-        """Arrays of all ranks; nothing but on the first."""
+        """Arrays of all ranks on the first rank; nothing on the others."""
         parts = self.body.comm.gather(mine) or []
         return {f"{rank} {name}": array for rank, part in enumerate(parts) for name, array in part.items()}
 
@@ -50,7 +50,7 @@ class Restart:
         return " ".join([*map(repr, self.body.effects), law])
 
     def write(self, frame: float, facts: dict[str, Any]) -> None:
-        """Keep the present state, which is that of a ``frame``, with what is to be known of the run until then."""
+        """Store the present state, that of ``frame``, with the facts of the run until then."""
         body = self.body
         arrays = self._gathered({"unknowns": body.unknowns.x.array} | body.clock.arrays())
         own = {"mesh": self.kept.mesh, "layout": self.layout, "recalled": body.recalled is not None}
@@ -65,8 +65,8 @@ class Restart:
             write_arrays(self.kept.place(frame), arrays)
 
     def good(self) -> tuple[int, ...]:
-        """The frames of states to go on from: all; of states in which other effects acted, those up to the first that is not in
-        equilibrium with what acts now, and none where time matters. The body is afterwards as it was.
+        """The frames of the states to continue from: all of them. If other effects acted in them, those up to the first that is
+        not in equilibrium now, and none where time matters. The body is restored afterwards.
         """
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at
@@ -92,7 +92,7 @@ class Restart:
         return arrays, facts, read_arrays(self.kept.folder / facts["layout"])
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
-        """Take up the state of the last of the ``frames``, and know the others again; the facts that were written with it."""
+        """Take up the state of the last of the ``frames`` and register the others; the facts stored with it."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
             arrays, facts, layout = self._read(frame)
@@ -106,7 +106,7 @@ class Restart:
         return facts
 
     def _spread(self, name: str, arrays: Mapping[str, Any], layout: Mapping[str, Any]) -> Floats:
-        """The values (n,) of this rank of what all ranks had, by cell."""
+        """This rank's values (n,) of an array of all ranks, by cell."""
         ranks = [int(key.split()[0]) for key in layout if key.endswith(" cells")]
         parts = [(layout[f"{rank} cells"], arrays[f"{rank} {name}"][layout[f"{rank} dofs"]]) for rank in ranks]
         inside = np.zeros((sum(len(cells) for cells, _ in parts), self.dofs.shape[1]))

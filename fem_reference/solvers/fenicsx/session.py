@@ -1,4 +1,4 @@
-"""One process of FEniCSx that solves bodies one after the other: what it has compiled and loaded serves the next."""
+"""One FEniCSx process that solves bodies one after the other, and reuses what it has compiled and loaded."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -21,10 +21,10 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 
 
 class Session:
-    """Solves bodies in a process of its own, which is started anew after it died."""
+    """Solves bodies in a subprocess of its own, which is restarted after it died."""
 
     def __init__(self, folder: Path, stack: ExitStack) -> None:
-        """``folder``: where jobs and states are passed; ``stack`` ends the processes."""
+        """``folder``: for jobs and states; ``stack`` ends the processes."""
         self.folder, self.stack = folder, stack
         self.process: Process | None = None
         self.closed = False
@@ -36,8 +36,8 @@ class Session:
         return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-        """The frames of ``body`` into ``sink``; a process that dies is the status *crashed*, and one that takes longer than the
-        time limit is ended and *timed out* or *stalled*, not an exception. RuntimeError once it is closed.
+        """Pass the frames of ``body`` to ``sink``. A process that dies is the status *crashed*, and one over the time limit is
+        ended and *timed out* or *stalled*, not an exception. RuntimeError once the session is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
@@ -48,13 +48,13 @@ class Session:
         return self.run(job, settings.time_limit, lambda event: sink(_state(event)), "states")
 
     def run(self, job: Path, time_limit: float | None, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
-        """Solve the ``job`` in a file, with each frame that is reported given to ``sink``; ``kept`` names what that keeps."""
+        """Solve the ``job`` in a file and pass each reported frame to ``sink``; ``kept`` names what remains of them."""
         if self.process is None:
             self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
         try:
             with self.process.limited(time_limit):
                 outcome = _followed(self.process, job, sink, kept)
-        except BaseException:  # what it still reports of this job is not of the next
+        except BaseException:  # later reports on this job must not reach the next
             self.process.end()
             self.process = None
             raise
@@ -100,7 +100,7 @@ def _state(event: dict[str, Any]) -> Frame:
 
 @contextmanager
 def session() -> Iterator[Session]:
-    """A session; its process ends with it. MissingSoftware where FEniCSx is not installed."""
+    """A session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
     with scratch.folder() as folder, ExitStack() as stack:
         own = Session(folder, stack)
@@ -112,7 +112,7 @@ def session() -> Iterator[Session]:
 
 @contextmanager
 def _opened() -> Iterator[Session]:
-    """The session that is shared now, or else one of its own."""
+    """The shared session, or else a new one."""
     if (shared_now := present()) is not None:
         yield shared_now
     else:
@@ -121,13 +121,13 @@ def _opened() -> Iterator[Session]:
 
 
 def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-    """The frames of ``body`` into ``sink``, by the session that is shared now or by one of its own."""
+    """Pass the frames of ``body`` to ``sink``, by the shared session or by a new one."""
     with _opened() as solver:
         return solver.follow(body, settings, sink)
 
 
 def solve_body(body: Body, settings: BodySettings) -> Run:
-    """The run of ``body``, in memory, by the session that is shared now or by one of its own."""
+    """The run of ``body``, in memory, by the shared session or by a new one."""
     with _opened() as solver:
         return solver.solve(body, settings)
 
@@ -137,8 +137,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Meanwhile all solutions on one rank are found in one process, that which is shared already if there is one: what it has
-    loaded and compiled serves the next. Without FEniCSx nothing is solved, and nothing shared.
+    """Meanwhile all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already shared
+    process remains in use. Without FEniCSx nothing is solved and nothing shared.
     """
     with session() if installed() and present() is None else nullcontext(present()) as own:
         before = _shared.set(own)
@@ -149,5 +149,5 @@ def shared() -> Iterator[None]:
 
 
 def present() -> Session | None:
-    """The session that is shared now, None where there is none."""
+    """The shared session, None where there is none."""
     return _shared.get()

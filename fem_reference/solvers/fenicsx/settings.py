@@ -17,19 +17,19 @@ class BodySettings(Record):
     easy step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts.
     ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of the volume equation.
-    ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default what the element needs.
-    ``linear_solver``: how the linear systems of Newton's method are solved: ``"direct"``, each exactly, by a factorisation of its
-    own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper, and
-    exactly from where load steps would else end; by default as the size asks. ``precision``: of factorisations, by default double
-    of direct ones and single of lagged ones. Both change the time and not the answer.
-    ``follow``: ``"equilibrium"`` as Newton's method finds it, or ``"stable"``: at a frame whose equilibrium is unstable, as far as
+    ``quadrature_degree``: of the polynomials integrated exactly on a straight cell, by default as the element needs.
+    ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation for each system, solved exactly; ``"lagged"``, inexact
+    FGMRES with a factorisation that serves until a new one is cheaper, and exact solutions where load steps would end otherwise;
+    by default as the size suggests. ``precision``: of factorisations, by default double for direct and single for lagged ones.
+    Both change the time and not the answer.
+    ``follow``: ``"equilibrium"`` as Newton's method finds it, or ``"stable"``: at a frame with an unstable equilibrium, as far as
     negative modes are counted, the body is moved along its lowest mode by a ``perturbation``, a share of its size (up to eight
-    times that, in both directions, until there are fewer), and solved anew.
-    ``reuse``: whether a frame under the same load as an earlier one takes up the state of then.
-    ``time_limit``: of processor time of a rank, when to give up, by default never; twenty times that by the clock is the status
-    *stalled*, which says nothing. ``store_state``: whether each frame also carries the unknowns of every cell, from which
+    times that, in both directions, until there are fewer negative modes), and solved again.
+    ``reuse``: take up the state of an earlier frame under the same load.
+    ``time_limit``: processor time of a rank after which to give up, by default none; twenty times that by the clock is the status
+    *stalled*, which allows no conclusion. ``store_state``: each frame also carries the unknowns of every cell, from which
     ``results`` evaluates stress, pressure, det F and fibre stretch; by default where those of all frames of a muscle take at most
-    64 MB, and never of a body.
+    64 MB, and never for a body.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -49,7 +49,7 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle; ``ranks``: MPI processes, by default one, two where that pays and cores are free: they change the
+    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two where that pays and cores are free; they change the
     time, not the answer.
     """
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class Spent:
-    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts in its own only."""
+    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts only once, as its own."""
 
     def __init__(self) -> None:
         self.seconds: defaultdict[str, float] = defaultdict(float)
@@ -17,7 +17,7 @@ class Spent:
 
     @contextmanager
     def on(self, phase: str) -> Iterator[None]:
-        """Meanwhile time is spent on ``phase``."""
+        """Meanwhile time counts for ``phase``."""
         self._note()
         self.within.append(phase)
         try:

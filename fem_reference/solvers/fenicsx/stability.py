@@ -15,15 +15,15 @@ _ITERATIONS = 40  # of inverse iteration
 
 
 def has_energy(body: Body) -> bool:
-    """True where all that acts on ``body`` has an energy, so that its tangent is symmetric; loads may have none."""
+    """True where all effects on ``body`` have an energy, so that its tangent is symmetric; loads may have none."""
     return not any(isinstance(effect, Load) for effect in body.effects)
 
 
 def softest(linear: LinearSolver, system: System, displacement: Ints) -> PETSc.Vec:
-    """The mode of the least eigenvalue, by magnitude, of the matrix that ``linear`` solves with; of length 1 in its displacements.
+    """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
 
-    By inverse iteration from a random start; ``displacement``: the unknowns that have a mass. ``LinearSolveError`` where nothing
-    is left to move.
+    Inverse iteration from a random start; ``displacement``: the unknowns that have a mass. ``LinearSolveError`` where no unknown
+    is free to move.
     """
     comm, moves = system.unknowns.function_space.mesh.comm, np.zeros(system.size)
     moves[displacement.ravel()] = 1.0
@@ -51,11 +51,11 @@ def displacements(mode: PETSc.Vec, system: System, displacement: Ints) -> Floats
 
 
 class Stability:
-    """The inertia of the tangent of a ``system``, by an LDL^T factorisation that ``linear`` goes on with.
+    """The inertia of the tangent of a ``system``, from an LDL^T factorisation that ``linear`` uses afterwards.
 
-    An unknown pressure p has the energy ``p (J - 1) - p^2 / 2K`` and takes one negative pivot of its own, -1/K; what is left are
-    the negative modes of the displacement with the pressure that belongs to it (Haynsworth 1968, doi 10.1016/0024-3795(68)90050-5).
-    What is prescribed has pivots of 1.
+    An unknown pressure p has the energy ``p (J - 1) - p^2 / 2K`` and takes one negative pivot of its own, -1/K. The others are
+    the negative modes of the displacement with its own pressure (Haynsworth 1968, doi 10.1016/0024-3795(68)90050-5).
+    Prescribed unknowns have pivots of 1.
     """
 
     def __init__(self, system: System, linear: Factorised, unknowns: fem.Function) -> None:
@@ -64,17 +64,17 @@ class Stability:
         self.pressures = space.sub(1).collapse()[0].dofmap.index_map.size_global if space.num_sub_spaces > 1 else 0
 
     def of_material(self) -> float:
-        """The ``negative_modes`` that the material has for certain: in which the energy falls as well where the pressure
-        follows the volume at every point. Pressures of an element meet the volume on average only: what shrinks here and swells
-        there costs nothing, and under a stress of several shear moduli the energy may fall that way, where that of the material
-        does not. The displacements of elements are a part of those that a body has: it has so many modes, or more.
+        """The ``negative_modes`` that the material certainly has: those in which the energy also falls where the pressure follows
+        the volume at every point. Pressures of an element control the volume on average only: shrinking in one place and swelling
+        in another costs nothing, and under a stress of several shear moduli the energy may fall that way although that of the
+        material does not. The elements' displacements are a subset of the body's, which has at least this many modes.
         """
         found = self._counted(pointwise=self.pressures > 0)
-        self._counted()  # what solves next finds the tangent and its factors as they were
+        self._counted()  # the next solve finds the tangent and its factors unchanged
         return found
 
     def negative_modes(self) -> float:
-        """In how many directions the energy falls from the present state; NaN where the tangent is singular."""
+        """The number of directions in which the energy falls from the present state; NaN where the tangent is singular."""
         return self._counted()
 
     def _counted(self, *, pointwise: bool = False) -> float:

@@ -26,8 +26,8 @@ _ROUNDING = 1e-11  # [mm] of positions
 
 
 class System:
-    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Those that are prescribed are left out: their residual is 0, their
-    row and column of the tangent a 1 on the diagonal.
+    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed ones are eliminated: their residual is 0, their row
+    and column of the tangent a 1 on the diagonal.
     """
 
     def __init__(
@@ -73,9 +73,7 @@ class System:
         self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
 
     def residual(self, tractions: Tractions | None = None) -> float:
-        """Sum the residual into ``b``, and return its norm; ``tractions`` of contact other than those at present may be
-        given.
-        """
+        """Sum the residual into ``b`` and return its norm; contact ``tractions`` other than the present ones may be given."""
         with self.spent.on("assembly"):
             self.work.array[:] = 0
             self.cells.add_residual(self.work.array)
@@ -84,7 +82,7 @@ class System:
     def linearise(
         self, moves: Floats | None = None, tractions: Tractions | None = None, *, pointwise: bool = False
     ) -> float:
-        """Sum the ``residual``, and the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to
+        """Sum the ``residual``, and the tangent into ``matrix``; the effect of ``moves`` (n,) of prescribed unknowns is added to
         first order. ``pointwise``: see ``cells``.
         """
         with self.spent.on("assembly"):
@@ -105,7 +103,7 @@ class System:
         return [terms for terms in (self.springs, self.loads) if terms is not None]
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """Add what is not of the cells, and the parts of other ranks; the norm of the residual."""
+        """Add all terms besides cells, and the parts of other ranks; the norm of the residual."""
         for terms in self._on_surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -119,8 +117,8 @@ class System:
         return norm
 
     def balance_units(self) -> None:
-        """Measure pressures in a unit in which they weigh in linear systems as displacements do [mm], instead of volumes [mm3]
-        against forces [N]: by the tangent at present.
+        """Choose a unit of pressure that gives volumes [mm3] and forces [N] equal weight in linear systems, from the present
+        tangent, so that pressures weigh as displacements [mm] do.
         """
         space = self.unknowns.function_space
         if space.num_sub_spaces == 1:
@@ -139,19 +137,19 @@ class System:
             self.tangent.unit = self.scale[pressures] = float(np.sqrt(stiff / coupling))
 
     def missing(self) -> Floats:
-        """The unknowns less what is prescribed of them (n,); 0 where nothing is."""
+        """The unknowns minus their prescribed values (n,); 0 where nothing is prescribed."""
         found = np.zeros(self.size)
         for one in self.conditions:
             found[one.exact] = self.unknowns.x.array[one.exact] - one.targets
         return found
 
     def lacking(self) -> bool:
-        """True where an unknown on any rank is not what is prescribed, but for rounding."""
+        """True where an unknown on any rank differs from its prescribed value by more than rounding."""
         most = np.abs(self.missing()).max(initial=0.0)
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self, *, inside: bool = False) -> Floats:
-        """The residual (n,) without springs and without what is prescribed, on the ranks that own the unknowns; or of what acts
+        """The residual (n,) without springs and prescribed values, on the ranks that own the unknowns; or that of the effects
         ``inside`` alone.
         """
         self.work.array[:] = 0
@@ -178,7 +176,7 @@ class SurfaceSums:
         self.places[fixed[rows] | fixed[self.matrix.indices]] = len(keys)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the terms to ``residual`` (n,), and to first order what ``moves`` (n,) of the unknowns change in them."""
+        """Add the terms to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
         fem.assemble_vector(residual, self.residual)
         if moves is not None:
             entries = (self.matrix.data, self.matrix.indices, self.matrix.indptr)

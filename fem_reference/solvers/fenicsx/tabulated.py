@@ -1,4 +1,4 @@
-"""Positions and unknowns at reference points of cells, from values of the basis functions there: nothing is compiled for it."""
+"""Positions and unknowns at reference points of cells, from tabulated basis functions; nothing is compiled."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +21,8 @@ def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Float
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """A part of the unknowns at reference points of cells: the ``values`` (q, k) there of basis functions and their ``slopes``
-    (3, q, k) along the coordinates of the reference cell, and the ``unknowns`` (m, k, c) of the cells' nodes.
+    """A part of the unknowns at reference points of cells: the ``values`` (q, k) of basis functions there, their ``slopes``
+    (3, q, k) along the reference coordinates, and the ``unknowns`` (m, k, c) of the cells' nodes.
     """
 
     values: Floats
@@ -39,14 +39,16 @@ class Tabulated:
 
 
 def tabulate(space: fem.FunctionSpace, unknowns: Ints, points: Floats) -> Tabulated:
-    """A part of the unknowns at reference ``points`` (q, 3): its ``space``, and of the cells' nodes the ``unknowns`` (m, k, c)."""
+    """A part of the unknowns at reference ``points`` (q, 3), from its ``space`` and the ``unknowns`` (m, k, c) of the cells'
+    nodes.
+    """
     element: Any = space.element.basix_element
     values, *slopes = element.tabulate(1, points)[..., 0]
     return Tabulated(values, np.stack(slopes), unknowns)
 
 
 class Displacement:
-    """The displacement among the ``unknowns`` of a body: its ``space``, and the unknowns (n, 3) of its nodes, ``dofs``."""
+    """The displacement among the ``unknowns`` of a body: its ``space`` and the unknowns ``dofs`` (n, 3) of its nodes."""
 
     def __init__(self, unknowns: fem.Function) -> None:
         self.unknowns = unknowns

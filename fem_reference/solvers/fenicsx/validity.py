@@ -1,8 +1,8 @@
-"""Checks of a state by means over cells: laws within the range that they are meant for, and no collapsed body.
+"""Checks of a state by means over cells: laws are within their ranges, and the body has not collapsed.
 
-By means, since the strain at the rim of what is attached has no bound in the exact solution: det F at a vertex there may be far
-off in a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a
-bulk modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
+Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far off in a cell
+that has kept its volume. Means of single cells may be off there too (0.37 and 1.9 in ``gluteus_maximus``, with a bulk modulus of
+a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
 """
 
 from collections.abc import Callable, Iterable
@@ -22,17 +22,17 @@ from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.tabulated import geometry
 
-# A cell with less of its volume at rest has collapsed, whatever the laws say: about four fifths of muscle are water, which does not
-# leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle); below a fifth there
-# would be no room for the rest of it alone. A body has where such cells are more than this share of it at rest: those at a rim are
-# fewer the smaller they are.
+# A cell with less of its rest volume has collapsed, whatever the laws state: about four fifths of muscle are water,
+# which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal
+# muscle); below a fifth even the rest would have no room. A body has collapsed where such cells are more than this
+# share of it at rest: those at a rim are fewer the smaller they are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
 
 @dataclass(frozen=True)
 class Extreme:
-    """The smallest or greatest mean over a cell, which cell of the body that is, and its rest position [mm]."""
+    """The smallest or greatest mean over a cell, with the cell of the body and its rest position [mm]."""
 
     value: float
     cell: int
@@ -44,7 +44,7 @@ class Extreme:
 
 @dataclass(frozen=True)
 class Outside:
-    """A ``law``, as scene files name it, outside the range of its ``limit``: how far at worst."""
+    """A ``law``, as scene files name it, outside the range of its ``limit``, with its worst value."""
 
     law: str
     limit: Limit
@@ -64,7 +64,7 @@ class Ranges:
         self.frames: dict[str, set[float]] = {}
 
     def add(self, frame: float, found: Iterable[Outside]) -> None:
-        """Those of the state at a frame."""
+        """Add the laws outside their ranges at a frame."""
         for one in found:
             self.first.setdefault(one.law, (frame, str(one)))
             self.frames.setdefault(one.law, set()).add(frame)
@@ -74,7 +74,7 @@ class Ranges:
         return [[law, frame, how, sorted(self.frames[law])] for law, (frame, how) in self.first.items()]
 
     def know(self, facts: list[Any]) -> None:
-        """Have had them added that gave ``facts``."""
+        """Restore the laws that gave ``facts``."""
         for law, frame, how, frames in facts:
             self.first[law], self.frames[law] = (frame, how), set(frames)
 
@@ -87,7 +87,7 @@ class Ranges:
 
 
 class Validity:
-    """The means over the cells of a body of what its laws have limits on. Its methods are collective."""
+    """The means over a body's cells of the measures that its laws limit. Its methods are collective."""
 
     def __init__(self, determinants: Determinants, form: Form, body: Body) -> None:
         self.mesh, self.cells, self.effects = determinants.mesh, determinants.cells, body.effects
@@ -102,13 +102,13 @@ class Validity:
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
 
     def volume_ratio(self) -> float:
-        """The volume of the body over that at rest."""
+        """The present volume of the body over its rest volume."""
         now = self.volumes.ravel() @ self.values["V/V0"]()
         present, rest = self.mesh.comm.allreduce(np.array([now, self.volumes.sum()]), MPI.SUM)
         return float(present / rest)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Collapsed where more than next to nothing of the body has lost too much of its volume."""
+        """Collapsed where more than next to nothing of the body has lost too much volume."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
@@ -118,8 +118,8 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """The extremes of the means in the present state, that of a ``frame``, and in how many cells a law is outside its range,
-        ``outside_law``; and each law outside it.
+        """The extremes of the means in the present state, that of ``frame``; the number of cells ``outside_law``, where a law is
+        outside its range; and each law outside it.
         """
         scalars: dict[str, float] = {}
         found: list[Outside] = []
@@ -135,7 +135,7 @@ class Validity:
         return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
 
     def _limits(self, measure: str, frame: float) -> list[tuple[str, Limit]]:
-        """The limits on a measure of the laws that act at a frame, by name of the law."""
+        """The limits on a measure by laws that act at a frame, by name of the law."""
         return [
             (type(effect).__module__.rpartition(".")[2], limit)
             for effect in self.effects
@@ -162,9 +162,7 @@ class Validity:
 
 
 def volumes_and_centres(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
-    """The volumes (n, q) [mm3] that the points of a ``rule`` stand for in the first ``count`` cells at rest, and the centres
-    (n, 3) [mm].
-    """
+    """The rest volumes (n, q) [mm3] of the points of a ``rule`` in the first ``count`` cells, and the centres (n, 3) [mm]."""
     points, weights = rule
     places, slopes = geometry(msh, points, slice(count))
     volumes = weights * np.abs(np.linalg.det(slopes))

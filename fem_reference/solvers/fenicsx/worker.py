@@ -47,18 +47,20 @@ class Worker:
             self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
         self.solving = self.solving_processor = self.checking = 0.0
-        self.reported = 0.0  # of solving_processor, up to the last frame that was reported
+        self.reported = 0.0  # solving_processor, up to the last reported frame
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
         self.unstable: dict[float, tuple[float, float]] = {}  # by frame, negative modes, and those of the material
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
-        self.exact = False  # whether linear systems are solved exactly because Newton's method failed else
-        self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
-        self.earlier: dict[str, float] = {}  # what processes before this one cost
+        self.exact = False  # linear systems are solved exactly after Newton's method failed otherwise
+        self.collapse = ""  # the result of attempts since the last good state, where a body collapsed in one
+        self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
     def begin(self) -> tuple[tuple[float, ...], StepSizes]:
-        """The frames to march through and the load steps: from rest, or from where a process before this one was cut off."""
+        """The frames to march through and the load steps: from rest, or from the frame at which an earlier process was cut
+        off.
+        """
         frames, settings = self.job.body.frames, self.settings
         first, good = settings.first_step, () if self.restart is None else self.restart.good()
         if self.restart is None or not good:
@@ -95,7 +97,7 @@ class Worker:
         self.report(status="converged", message=message, cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the last state; on failure go back to it."""
+        """Solve at ``frame`` from the last state; restore that on failure."""
         begin, processor = time.perf_counter(), time.process_time()
         result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
@@ -105,22 +107,22 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on; True where that is another way than until now. What is left of an inexact
-        solution moves a body that is next to free far away.
+        """Solve linear systems exactly from now on; True where that is a change. The residual of an inexact solution moves a
+        nearly free body far away.
         """
         other = self.body.linear.solve_exactly()
         self.exact |= other
         return other
 
     def stabilise(self, frame: float) -> None:
-        """Leave the equilibrium of a ``frame`` where it is unstable and that is not wanted."""
+        """Leave an unstable equilibrium of ``frame`` where a stable one is requested."""
         if self.settings.follow == "stable":
             left = leave(self.body, frame, self.settings.perturbation)
             if left is not None:
                 self.left[frame] = left
 
     def departures(self) -> str:
-        """The note on equilibria that were left, nothing where there are none."""
+        """The note on equilibria that were left, empty without."""
         if not self.left:
             return ""
         most = max(self.left.values())
@@ -130,8 +132,8 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from the state of a frame that was reached, where it can be known;
-        the time for it is no part of solving.
+        """The number of directions in which the energy falls from the state of a reached frame, where it can be known; its time
+        does not count as solving.
         """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
@@ -140,7 +142,7 @@ class Worker:
         return {} if modes is None or own is None else {"negative_modes": modes, "material_modes": own}
 
     def instability(self) -> str:
-        """The note on unstable states, nothing where there are none."""
+        """The note on unstable states, empty without."""
         if not self.unstable:
             return ""
         most, own = (max(modes) for modes in zip(*self.unstable.values(), strict=True))
@@ -150,7 +152,7 @@ class Worker:
         )
 
     def failure(self, reached: Step) -> tuple[str, str]:
-        """The status of a run that did not reach a frame, and why in words."""
+        """The status of a run that did not reach a frame, and the reason in words."""
         if self.collapse:
             return "collapsed", self.sentence(reached)
         limit = ahead(self.body, self.settings.smallest_step)
@@ -202,13 +204,13 @@ class Worker:
         self.report(frame=reached.frame, file=str(path), scalars=scalars, residuals=reached.last.residuals)
 
     def report(self, **event: Any) -> None:
-        """A line for the parent process."""
+        """Report a line to the parent process."""
         if self.body.comm.rank == 0:
             report(**event)
 
     def cost(self) -> dict[str, float]:
-        """Seconds by phase as the first rank sees them, counts, and processor time and memory over all ranks; with what processes
-        before this one took up to the frame from which it went on.
+        """Seconds by phase on the first rank, counts, and processor time and memory over all ranks; with the cost of earlier
+        processes up to the frame from which this one continued.
         """
         spent = self.body.spent
         memory = self.body.comm.allreduce(peak_memory())
@@ -220,7 +222,7 @@ class Worker:
             **{f"seconds_{name}": spent.seconds[name] for name in ("assembly", "contact", "factorisation", "krylov")},
             "seconds_stability": self.checking,
             "seconds_processor": processor,
-            "seconds_processor_solve": solving,  # without what was compiled
+            "seconds_processor_solve": solving,  # without compilation
             **{name: float(spent.counts[name]) for name in _COUNTED},
             **{name: float(count) for name, count in self.counts.items()},
         }
@@ -235,7 +237,7 @@ class Worker:
 
 
 def solve_field(problem: FieldProblem, folder: Path) -> None:
-    """Solve for a scalar field, whose values are a frame; there is one rank."""
+    """Solve for a scalar field, whose values are reported as one frame; there is one rank."""
     values, outcome = assembled_field.solve(problem)
     path = folder / "field.npz"
     np.savez(path, allow_pickle=False, values=values)
@@ -252,16 +254,16 @@ _SOLVE: dict[Task, Callable[[Any, Path], None]] = {"solve_field": solve_field, "
 
 
 def report(**event: Any) -> None:
-    """A line for the process that started this one."""
+    """Report a line to the process that started this one."""
     sys.stdout.write(f"{MARK}{json.dumps(event)}\n")
     sys.stdout.flush()
 
 
 def main(argument: str) -> None:
-    """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
+    """Solve the job in a file; or, for ``-``, the jobs whose files standard input names, one after the other."""
     end_with_starter()
     compiling.prepare()
-    gc.freeze()  # what is imported stays: what is collected after each job is looked for among what that left
+    gc.freeze()  # imported objects stay, and collections after each job skip them
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
         job = pickle.loads(path.read_bytes())

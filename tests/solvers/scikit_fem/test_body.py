@@ -84,7 +84,7 @@ def test_a_uniaxial_stretch_is_that_of_the_scalar_equation(element) -> None:
     for name in ("min_det_F_quadrature", "min_det_F_vertices", "volume_ratio"):
         assert state.scalars[name] == pytest.approx(determinant, abs=1e-10)
     assert state.scalars["energy"] == pytest.approx(24 * energy(stretch, across), abs=1e-9)
-    assert [one.frame for one in solution.states] == [0.0, 0.5, 1.0]
+    assert [one.number for one in solution.states] == [0.0, 0.5, 1.0]
     assert solution.states[0].points == pytest.approx(given.mesh.points, abs=0)
 
 
@@ -208,7 +208,7 @@ def test_cells_turned_inside_out_are_a_status() -> None:
     solution = solve_body(given, ScikitBodySettings(element="Q1"))
     assert solution.outcome.status == "inverted"
     assert "det F fell to -" in solution.outcome.message
-    assert [state.frame for state in solution.states] == [0.0, 0.25]
+    assert [state.number for state in solution.states] == [0.0, 0.25]
 
 
 def test_equations_without_a_solution_are_a_status() -> None:

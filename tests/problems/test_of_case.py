@@ -1,0 +1,71 @@
+"""Cases of every kind as problems: with the effects that they need, and in words."""
+
+from dataclasses import replace
+
+import pytest
+import small
+from auto_scenes import CONTACT, WEIGHT, scene_of
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems import of_case
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.report.sections import origin
+from fem_reference.scenes import casefile
+
+
+def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
+    light, heavy = (scene_of(tmp_path / text, WEIGHT.format(density=text)) for text in ("0.001", "100000"))
+    kept = [of_case.chosen(one) for one in (light, heavy)]
+    assert [len(one.effects) for one in kept] == [2, 3]
+    assert [len(one.decisions) for one in kept] == [3, 3]
+    listed = scene_of(tmp_path / "listed", "", "listed")
+    assert kept[0].key == listed.key
+    assert of_case.chosen(kept[0]) is kept[0]
+    assert of_case.chosen(listed) is listed
+    assert origin.changes(kept[0]) == [], "what it chose is no change of its file"
+    assert "Gravity: left out" in str(kept[0].decisions[2])
+    assert "Gravity: needed" in str(kept[1].decisions[2])
+    assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
+
+
+def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:
+    """A third bone beside the bar, which rests: 1.5 mm from where that goes, and 600 mm."""
+    found = []
+    for away in (1.5, 600.0):
+        ball = f'\n[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {-away - 20}, 36 mm", radius = "20 mm" }}\n'
+        scene = scene_of(tmp_path / f"{away:g}", ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'))
+        found.append(of_case.chosen(scene).decisions[-1])
+    assert [one.needed for one in found] == [True, False]
+    assert found[1].indicator.estimate == 0
+
+
+def test_a_scalar_field_needs_all_and_is_its_own_set_up() -> None:
+    case = casefile.read("rod_advection")
+    rest = of_case.setup(case)
+    assert isinstance(rest, FieldProblem)
+    assert of_case.problem(case, rest) is rest
+    assert of_case.explained(case) == ()
+    assert of_case.chosen(case) is case
+    assert of_case.known(case, rest) == {}
+    assert of_case.watch(case, rest, lambda: rest) is None
+    assert of_case.scalar_case(case) is case
+
+
+def test_the_case_of_a_muscle_is_no_scalar_one(tmp_path) -> None:
+    case = scene_of(tmp_path, "")
+    for place in (None, "here"):
+        with pytest.raises(
+            InputError, match=f'{place or "case.toml"}: got "bar", the case of a muscle, want a scalar case'
+        ):
+            of_case.scalar_case(case, place)
+
+
+def test_what_was_found_to_matter_acts_and_the_rest_stays_left_out(tmp_path) -> None:
+    light = of_case.chosen(scene_of(tmp_path, WEIGHT.format(density="0.001") + small.FIBRES.format(slack=1.3)))
+    first, second = light.decisions[2:]
+    assert not first.needed
+    assert not second.needed
+    found = of_case.with_effects(light, (replace(second, needed=True, turned_out=5.0),))
+    assert found.effects == (*light.effects, second.effect)
+    assert [one.turned_out for one in found.decisions] == [None, None, None, 5.0]
+    assert len(light.effects) == 2, "the case itself is as it was"

@@ -1,0 +1,80 @@
+"""Muscles before they are meshed: where their bones are, and what of their surface is attached to them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapes
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, check_closed
+from fem_reference.geometry.rigid_bodies import Box, HalfSpace
+from fem_reference.problems import muscle
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.scenes import casefile
+
+
+def test_a_body_rests_where_it_has_no_motion(bar) -> None:
+    floor, lid = muscle.setup(casefile.read(bar)).bones
+    assert np.array_equal(floor.pose(7), np.eye(4))
+    assert not np.array_equal(lid.pose(7), np.eye(4))
+
+
+def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
+    floor, lid = muscle.setup(squeezed).bones
+    assert floor.shape == floor.solid == HalfSpace((0, 10, 0), (0, 1, 0))
+    assert lid.shape == lid.solid == Box((0, 140, 0), (400, 100, 400), 0)
+    for bone in (floor, lid):
+        assert check_closed(bone.surface) is bone.surface
+    assert lid.pose(50) == pytest.approx(np.array([[1, 0, 0, 0], [0, 1, 0, -20], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    assert np.array_equal(floor.pose(50), np.eye(4))
+
+
+BALL = shapes.sphere(2, 10.0)
+
+
+def held(*vertices: list[int]) -> Setup:
+    """A ball of 10 mm with a bone for each list of its vertices."""
+    bones = tuple(Bone(f"bone {i}", shapes.sphere(1), None) for i in range(len(vertices)))
+    attached = tuple(
+        AttachedVertices(f"to {bone.name}", bone, np.array(some)) for bone, some in zip(bones, vertices, strict=True)
+    )
+    return Setup(BALL, bones, attached, (0, 1), None)
+
+
+def test_a_surface_in_a_file_has_its_distance_with_what_is_inside_below_zero(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("fem_reference.problems.setup.kept_distances", lambda: tmp_path)
+    shape = Bone("ball", BALL, None).shape
+    at = np.array([[0.0, 0, 12], [9, 0, 0], [0, 6, 8]])
+    # Triangles of a ball of 10 mm are up to a fifth of a millimetre inside it, and its edges are rounded.
+    assert shape.sample(at).distance == pytest.approx(np.linalg.norm(at, axis=1) - 10, abs=0.4)
+    assert any(tmp_path.iterdir())
+
+
+def test_an_open_surface_of_a_bone_is_refused_by_the_name_of_the_bone(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("fem_reference.problems.setup.kept_distances", lambda: tmp_path)
+    with pytest.raises(InputError, match='bone "femur": a file'):
+        _ = Bone("femur", Surface(BALL.points, BALL.triangles[1:], "a file"), None).shape
+
+
+def test_attached_vertices_are_those_of_each_attachment_in_turn() -> None:
+    assert held([5, 1], [7]).attached_vertices.tolist() == [5, 1, 7]
+    assert held().attached_vertices.tolist() == []
+
+
+def test_what_is_attached_is_not_free_and_what_is_far_from_it_is() -> None:
+    z = BALL.points[:, 2]
+    rest = held(np.flatnonzero(z > 5).tolist())
+    assert not rest.free[z > 5].any()
+    assert rest.free[z < 0].all()
+    assert held().free.all()
+
+
+def test_a_start_says_where_points_begin() -> None:
+    rest = held()
+    points = BALL.points[:4]
+    for start, shift in ((None, 0.0), (lambda at: at + [1.0, 0, 0], [1.0, 0, 0])):
+        begun = replace(rest, start=start).begin(points)
+        assert np.array_equal(begun, points + shift)
+        begun[:] = 0  # an array of the caller's own
+        assert np.array_equal(points, BALL.points[:4])
