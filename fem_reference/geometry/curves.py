@@ -1,0 +1,95 @@
+"""Curves from few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
+
+A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two of the report's formulas
+are misprinted: in the second row of the Bezier matrix (3.1) the signs must be -3, 3, and the matrix (3.2) is the uniform spline, not
+the centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from scipy.interpolate import BPoly, CubicHermiteSpline, RBFInterpolator, interp1d
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+
+Curve = Callable[[Floats], Floats]
+
+
+def knots(points: Floats, exponent: float = 1.0) -> Floats:
+    """Parameters (n,) of ``points`` (n, d), from 0 to 1, whose differences grow with the distance to the power of ``exponent``:
+    0 uniform, 0.5 centripetal, 1 chordal.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if len(points) < 2 or not (steps > 0).all():
+        raise InputError(
+            "curve", f"{len(points)} points, {int((steps == 0).sum())} repeated", "two points or more, all apart"
+        )
+    ends = np.concatenate([[0.0], np.cumsum(steps**exponent)])
+    return np.asarray(ends / ends[-1])
+
+
+def constant(points: Floats) -> Curve:
+    """The nearest of ``points`` (n, d) by chord length (report 3.1)."""
+    return interp1d(knots(points), points, kind="nearest", axis=0)
+
+
+def linear(points: Floats) -> Curve:
+    """Straight between ``points`` (n, d) (report 3.1)."""
+    return interp1d(knots(points), points, axis=0)
+
+
+def bezier(points: Floats) -> Curve:
+    """The Bezier curve of degree n - 1 whose control points are ``points`` (n, d); it passes the first and the last (3.1)."""
+    knots(points)
+    return BPoly(points[:, None], [0.0, 1.0])
+
+
+def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
+    """The spline of Catmull and Rom through ``points`` (n, d): 0 uniform (3.2), 0.5 centripetal, 1 chordal.
+
+    Its tangents are those of the parabola through a point and its two neighbours (Barry and Goldman 1988,
+    doi 10.1145/378456.378511). At an end the point itself stands for the missing neighbour (report 3.3): half the chord's slope.
+    """
+    times = knots(points, exponent)
+    slopes = np.diff(points, axis=0) / np.diff(times)[:, None]
+    wide = (times[2:] - times[:-2])[:, None]
+    inner = slopes[:-1] + slopes[1:] - (points[2:] - points[:-2]) / wide
+    return CubicHermiteSpline(times, points, np.concatenate([slopes[:1] / 2, inner, slopes[-1:] / 2]))
+
+
+def fourier(points: Floats, harmonics: int | None = None) -> Curve:
+    """The discrete Fourier series of ``points`` (n, d), which count as equidistant and periodic beside their chord (3.4, 3.5).
+
+    The straight line between both ends is taken off first and the rest continued as an odd function, so that the ends are met.
+    ``harmonics``: the number of sines kept, at most n - 2; all interpolate.
+    """
+    count = len(knots(points)) - 1
+    kept = count - 1 if harmonics is None else min(harmonics, count - 1)
+    orders, at = np.arange(1, kept + 1), np.linspace(0, 1, count + 1)
+    chord = linear(points[[0, -1]])
+    weights = 2 / count * np.sin(np.pi * np.outer(orders, at)) @ (points - chord(at))
+    return lambda t: chord(t) + np.sin(np.pi * np.outer(t, orders)) @ weights
+
+
+def radial(points: Floats, shape: float = 3.0) -> Curve:
+    """Gaussian radial basis functions with a linear polynomial through ``points`` (n, d) by chord length (3.6, 3.10).
+
+    ``shape``: over the length of the curve, the inverse width of a Gaussian.
+    """
+    times = knots(points)
+    found = RBFInterpolator(times[:, None], points, kernel="gaussian", epsilon=shape, degree=1)
+    return lambda t: np.asarray(found(np.asarray(t, dtype=float)[:, None]))
+
+
+# Each technique by the name that pages and scenes use, with the smoothness of its curves: of class C^-1, C^0, ...
+TECHNIQUES: dict[str, tuple[Callable[[Floats], Curve], float]] = {
+    "constant": (constant, -1),
+    "piecewise linear": (linear, 0),
+    "Bezier": (bezier, np.inf),
+    "Catmull-Rom, uniform": (partial(catmull_rom, exponent=0.0), 1),
+    "Catmull-Rom, centripetal": (catmull_rom, 1),
+    "Fourier": (fourier, np.inf),
+    "Gaussian RBF": (radial, np.inf),
+}

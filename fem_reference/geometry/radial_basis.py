@@ -1,0 +1,102 @@
+"""Sums of radial basis functions for scattered values, with centres by grid, Halton, greedy search or features (report 3.5)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+from scipy.stats import qmc
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+
+# From distances times the shape parameter to values: Gauss, and Wendland's of compact support and class C2 (1995,
+# doi 10.1007/BF02123482).
+KERNELS: dict[str, Callable[[Floats], Floats]] = {
+    "gaussian": lambda r: np.exp(-(r**2)),
+    "wendland": lambda r: np.maximum(1 - r, 0) ** 4 * (4 * r + 1),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RadialSum:
+    """``sum_i weights_i kernel(shape |x - centres_i|)`` plus a polynomial of degree 0 or 1, if any (3.6, 3.7, 3.10).
+
+    ``centres`` (m, d), ``weights`` (m,), ``polynomial`` (0,), (1,) or (d + 1,); ``shape``: one over a length; ``condition``: the
+    condition number of the matrix that gave the weights.
+    """
+
+    centres: Floats
+    weights: Floats
+    polynomial: Floats
+    shape: float
+    kernel: str
+    condition: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """Values (n,) at ``points`` (n, d)."""
+        found = KERNELS[self.kernel](self.shape * cdist(points, self.centres)) @ self.weights
+        return np.asarray(found + _monomials(points, len(self.polynomial)) @ self.polynomial)
+
+
+def radial_sum(
+    points: Floats, values: Floats, centres: Floats, shape: float, *, kernel: str = "gaussian", terms: int = 0
+) -> RadialSum:
+    """The sum with these ``centres`` (m, d) whose ``values`` (n,) at ``points`` (n, d) are nearest in the mean square; as many
+    centres as points interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; no sum of weights takes its place (3.10).
+    """
+    if len(centres) > len(points) or len(centres) <= terms:
+        raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
+    basis = np.hstack([KERNELS[kernel](shape * cdist(points, centres)), _monomials(points, terms)])
+    # Weights are orthogonal to the polynomials: they are sought in the null space of those.
+    flat = np.linalg.qr(_monomials(centres, terms), mode="complete").Q[:, terms:]
+    free = np.hstack([basis[:, : len(centres)] @ flat, basis[:, len(centres) :]])
+    found, _, _, singular = np.linalg.lstsq(free, values, rcond=None)
+    inner = found.shape[0] - terms
+    return RadialSum(centres, flat @ found[:inner], found[inner:], shape, kernel, float(singular[0] / singular[-1]))
+
+
+def _monomials(points: Floats, terms: int) -> Floats:
+    """The first ``terms`` of 1, x, y, ... at ``points`` (n, d): (n, terms)."""
+    return np.hstack([np.ones((len(points), 1)), points])[:, :terms]
+
+
+def grid_centres(points: Floats, count: int) -> Floats:
+    """At most ``count`` centres at the nodes of a regular grid over the box of ``points`` (n, d)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    each = int(count ** (1 / points.shape[1]) + 1e-9)
+    axes = np.meshgrid(*[np.linspace(a, b, each) for a, b in zip(low, high, strict=True)], indexing="ij")
+    return np.stack([axis.ravel() for axis in axes], axis=1)
+
+
+def halton(count: int, dimensions: int) -> Floats:
+    """The first ``count`` points (count, d) of Halton's sequence, whose bases are the first primes, in the open unit cube (3.8)."""
+    return np.asarray(qmc.Halton(dimensions, scramble=False).fast_forward(1).random(count))
+
+
+def halton_centres(points: Floats, count: int) -> Floats:
+    """``count`` centres by Halton's sequence in the box of ``points`` (n, d)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return low + (high - low) * halton(count, points.shape[1])
+
+
+def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, terms: int = 0) -> Floats:
+    """``count`` of the ``points`` (n, d), one after the other where the sum with those before deviates most from ``values`` (n,)."""
+    chosen = list(np.argsort(-np.abs(values - values.mean()), kind="stable")[: terms + 1])
+    while len(chosen) < count:
+        off = np.abs(values - radial_sum(points, values, points[chosen], shape, terms=terms)(points))
+        off[chosen] = -1
+        chosen.append(int(np.argmax(off)))
+    return points[chosen[:count]]
+
+
+def feature_centres(points: Floats, values: Floats, count: int, *, neighbours: int = 6) -> Floats:
+    """``count`` of the ``points`` (n, d): local maxima and minima of ``values`` (n,) among their neighbours first, then where the
+    values bend most, as the report places them (3.5.1).
+    """
+    _, near = cKDTree(points).query(points, k=min(neighbours + 1, len(points)))
+    around = values[near[:, 1:]]
+    extreme = (values > around.max(axis=1)) | (values < around.min(axis=1))
+    bend = np.abs(values - around.mean(axis=1))
+    return points[np.lexsort((-bend, ~extreme))[:count]]
