@@ -1,8 +1,8 @@
 """Curves from few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
-A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two of the report's formulas
-are misprinted: in the second row of the Bezier matrix (3.1) the signs must be -3, 3, and the matrix (3.2) is the uniform spline, not
-the centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
+A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report are
+misprinted: in the second row of the Bezier matrix (3.1) the signs must be -3, 3; and the matrix (3.2) is the uniform spline, not the
+centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable
