@@ -264,7 +264,7 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
 
     def shell(face: Floats, direction: Floats, depth: Floats) -> Floats:
         share = (growth ** (layers * depth) - 1) / (growth**layers - 1)
-        return core * face + share * (outer * direction - core * face)
+        return np.asarray(core * face + share * (outer * direction - core * face))
 
     middle = Brick(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
     return mapped([middle, *_patches(shell, (n, n, layers), {"z1": "outer"})], kind, degree)

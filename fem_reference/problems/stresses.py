@@ -11,8 +11,8 @@ from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, 
 
 Acting = Sequence[tuple[Effect, float]]
 
-# So many tetrahedra are looked at, evenly spread, and so many at once, so that their jets fit in a cache.
-_MOST, _AT_ONCE = 2048, 1024
+# The tetrahedra that are sampled, evenly spread, and the places evaluated at once, so that their jets fit in a cache.
+_MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
 
 
@@ -30,8 +30,8 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
     fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without what time makes.
     """
     found = np.zeros(F.shape)
-    for start in range(0, len(F), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
+    for start in range(0, len(F), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
         jets = variables(F[some].reshape(-1, 9).T)
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JetFunctions())

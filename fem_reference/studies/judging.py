@@ -6,7 +6,7 @@ from dataclasses import replace
 from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.runs.complete import complete
+from fem_reference.runs.reached import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.studies import convergence
