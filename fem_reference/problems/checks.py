@@ -166,20 +166,17 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
             raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
         if names.count(entry.name) > 1:
             raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
-        _check_components(f"{place}.components", entry.components)
+        axes = isinstance(entry.components, tuple | list) and len(entry.components) > 0
+        axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in entry.components)
+        if not axes or len(set(entry.components)) < len(entry.components):
+            want = "axes among 0, 1, 2 for x, y, z, each once"
+            raise InputError(f"{place}.components", said(entry.components), want)
         if not callable(entry.path):
             raise InputError(f"{place}.path", said(entry.path), "a function of points and a frame number")
         if entry.stiffness is None and not isinstance(entry.on, str):
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
             raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
-
-
-def _check_components(place: str, components: Any) -> None:
-    axes = isinstance(components, tuple | list) and len(components) > 0
-    axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in components)
-    if not axes or len(set(components)) < len(components):
-        raise InputError(place, said(components), "axes among 0, 1, 2 for x, y, z, each once")
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
@@ -221,14 +218,15 @@ def _check_needs(body: Body) -> None:
 
 def check_agreement(body: Body) -> None:
     """Raise InputError where two regions prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed.
+    followed. They are compared at all frames, all stops, and the middles between them.
     """
-    looked_at = _looked_at(body)
+    ends = np.unique([*body.frames, *body.stops])
+    sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]
     for one, other in combinations(exact, 2):
         common = sorted(set(one.components) & set(other.components))
         places = _shared(body.mesh, str(one.on), str(other.on)) if common else np.zeros((0, 3))
-        for frame in looked_at if len(places) else ():
+        for frame in sampled if len(places) else ():
             found = [entry.displacements(places, frame)[:, common] for entry in (one, other)]
             off = np.abs(found[0] - found[1]).max(axis=1)
             if not off.max() <= SAME * (body.size + np.abs(found).max()):
@@ -242,16 +240,11 @@ def _check_start(body: Body) -> None:
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
-            place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
-            raise InputError(
-                place, f"displacements up to {off:.4g} mm", "none at the first frame: the body begins at rest"
+            place, got = (
+                f'prescribed "{entry.name}": path at frame {body.frames[0]:g}',
+                f"displacements up to {off:.4g} mm",
             )
-
-
-def _looked_at(body: Body) -> Floats:
-    """The sampled frames: all frames, all stops, and the middles between them."""
-    ends = np.unique([*body.frames, *body.stops])
-    return np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+            raise InputError(place, got, "none at the first frame: the body begins at rest")
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:

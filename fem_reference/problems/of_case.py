@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.problems import muscle, scalar
@@ -17,10 +19,10 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.problem import Meshed, Problem
+from fem_reference.problems.problem import Problem
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.problems.setup import Bone, Setup
-from fem_reference.problems.watch import Watch
+from fem_reference.problems.stresses import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -52,12 +54,23 @@ class CaseSetup(Problem, Protocol):
         """The scalar field, None for a muscle."""
 
 
-class CaseProblem(CaseSetup, Meshed, Protocol):
+class CaseProblem(CaseSetup, Protocol):
     """The problem of a case as a solver receives it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
+
+    @property
+    def effects(self) -> tuple[Record, ...]:
+        """The effects that act."""
+
+    @property
+    def mesh_facts(self) -> dict[str, float] | dict[str, float | str]:
+        """Size and quality of its mesh, by name."""
 
     @property
     def muscle(self) -> MuscleProblem | None:
         """The muscle, None for a scalar field."""
+
+    def write_meshes(self, folder: Path, /) -> None:
+        """Write the mesh of the solution into ``folder``, for ParaView."""
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:

@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -122,20 +122,15 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
         np.savez(part, allow_pickle=False, **arrays)
 
 
-def _check_size(file: BinaryIO) -> None:
-    """Raise ValueError where arrays would take more than ``MOST_BYTES`` of memory."""
-    with zipfile.ZipFile(file) as members:
-        size = sum(member.file_size for member in members.infolist())
-    file.seek(0)
-    if size > MOST_BYTES:
-        raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
-
-
 def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
     """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
     try:
         with path.open("rb") as file:
-            _check_size(file)
+            with zipfile.ZipFile(file) as members:
+                size = sum(member.file_size for member in members.infolist())
+            if size > MOST_BYTES:
+                raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
+            file.seek(0)
             with np.load(file, allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in names or arrays.files}
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from fem_reference.problems.estimates import Decision
-from fem_reference.problems.watch import Watch
+from fem_reference.problems.stresses import Watch
 from fem_reference.runs import cut_off
 from fem_reference.runs.store import Frame, Run
 from fem_reference.runs.writer import Writer
