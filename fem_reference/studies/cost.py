@@ -25,7 +25,7 @@ from fem_reference.studies.campaign import Made, Workers, carry_out
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
-from fem_reference.studies.resampled_scenes import carried, resample
+from fem_reference.studies.scene_changes import carried, resample
 from fem_reference.studies.true_errors import claims_of
 
 log = logging.getLogger(__name__)

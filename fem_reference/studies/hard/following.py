@@ -19,8 +19,8 @@ from fem_reference.runs.fields import VALUES
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies.hard.choosing import task_of
-from fem_reference.studies.hard.steps import check_not_stalled
+from fem_reference.studies.hard.records import task_of
+from fem_reference.studies.hard.repeats import check_not_stalled
 
 _MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
 

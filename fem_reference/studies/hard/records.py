@@ -20,12 +20,18 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.bones import CaseBone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
-from fem_reference.studies.hard.choosing import choices, task_of
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
 _MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
+REFERENCE, SECOND = "fenicsx", "scikit_fem"
+LIMIT = 120.0  # [s] of processor time of a run
+_OWN: dict[str, dict[str, Any]] = {
+    REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
+    SECOND: {},
+    "line_of_action": {},
+}
 
 
 class Lattice(Record):
@@ -164,6 +170,23 @@ class Hard(Record):
         """The solver of ``defaults`` with the settings that this case changes."""
         changes = self.settings.get(defaults.solver, {})
         return SolverChoice(**{"solver": defaults.solver, **defaults.settings, **changes})
+
+
+def choices() -> dict[str, SolverChoice]:
+    """Settings that hard cases are solved with, by solver: those of the first candidate of Table 5.1 that has it."""
+    found: dict[str, SolverChoice] = {}
+    for candidate in solvers.in_table():
+        found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
+    for name in solvers.names():
+        if name != "recorded" and (name in _OWN or name in found):
+            found.setdefault(name, SolverChoice(solver=name, **_OWN.get(name, {})))
+    first = [name for name in (REFERENCE, SECOND) if name in found]
+    return {name: found[name] for name in (*first, *sorted(set(found) - {*first}))}
+
+
+def task_of(solver: str, task: Task) -> Task:
+    """The task that a solver is asked for in a case of a ``task``: the second solver has none for muscles but that of bodies."""
+    return "solve_body" if task == "solve" and solver == SECOND else task
 
 
 def folders() -> list[str]:

@@ -24,11 +24,10 @@ from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
-from fem_reference.studies.hard import blocks, jitters, steps
-from fem_reference.studies.hard.choosing import LIMIT, REFERENCE, SECOND, choices
+from fem_reference.studies.hard import blocks, repeats
 from fem_reference.studies.hard.following import follow
-from fem_reference.studies.hard.records import Hard
-from fem_reference.studies.hard.steps import SameEnd, StalledError
+from fem_reference.studies.hard.records import LIMIT, REFERENCE, SECOND, Hard, choices
+from fem_reference.studies.hard.repeats import SameEnd, StalledError
 
 log = logging.getLogger(__name__)
 
@@ -172,12 +171,12 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
     hard, muscle = posed.hard, posed.problem.muscle
     if muscle is None or not posed.is_reference(choice.solver):
         return
-    wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
+    wanted = hard.steps or (repeats.farthest(followed) if posed.in_steps and hard.start is None else None)
     if wanted is not None:
-        yield steps.compare(muscle, choice, wanted)
+        yield repeats.in_steps(muscle, choice, wanted)
     if posed.jitters:
         first = outcome, followed
-        yield jitters.compare(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
+        yield repeats.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
