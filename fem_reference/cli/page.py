@@ -110,9 +110,11 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
     """Frames that somebody else's solvers made, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
-        case, _, folder = text.partition("=")
-        if not folder:
+        case, equals, folder = text.partition("=")
+        if not equals:
             raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
+        if not folder:
+            raise InputError("--candidate", '""', "a folder of frames")
         name = casefile.read_muscle(case).name
         if name not in cases:
             raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")

@@ -1,6 +1,7 @@
 """The verb ``study``: what accuracy costs in time on cases."""
 
 import argparse
+from dataclasses import replace
 
 from fem_reference import solvers
 from fem_reference.assessment.cost_study import Study, facts
@@ -53,7 +54,10 @@ def _pages(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) 
     more = [*changes(options), *(Part(("--solver", name), name) for name in options.solver)]
     parts = {scene.name: case_part(scene) for scene in scenes}
     pages = [
-        (Asked("study", case.case, (parts[case.case], *more), PAGE), study_page.page(cost.alone(found, case)))
+        (
+            Asked("study", case.case, (parts[case.case], *more), PAGE),
+            study_page.page(replace(found, cases=(case,), missing={})),
+        )
         for case in found.cases
     ]
     if len(pages) != 1:

@@ -47,13 +47,16 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
     """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
-    ends, words = dict[int, Floats](), list[str]()
+    ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
-        status, end = _end(built, choice, steps.until, count)
-        if end is None:
-            words.append(f"{count}: {status}")
+        step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
+        settings, frames = fenicsx.Settings(**{**choice.settings, **step}), list[Frame]()
+        outcome = fenicsx.solve(replace(built, frames=(built.frames[0], steps.until)), settings, frames.append)
+        check_not_stalled(outcome)
+        if outcome.status == "converged":
+            ends[count] = frames[-1].points
         else:
-            ends[count] = end
+            words.append(f"{count}: {outcome.status}")
     if not ends:
         return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
     standard, size = ends[max(ends)], diagonal(built.surface.points)
@@ -61,17 +64,6 @@ def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> S
     apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
     listed = ", ".join(apart + words) or "one only"
     return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
-
-
-def _end(built: MuscleProblem, choice: SolverChoice, until: int, count: int) -> tuple[str, Floats | None]:
-    """The status of a run in ``count`` steps, and the tetrahedra's points (n, 3) [mm], None where it did not get there."""
-    span = until - built.frames[0]
-    step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
-    settings = fenicsx.Settings(**{**choice.settings, **step})
-    frames = list[Frame]()
-    outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
-    check_not_stalled(outcome)
-    return outcome.status, frames[-1].points if outcome.status == "converged" else None
 
 
 def check_not_stalled(outcome: Outcome) -> None:
@@ -115,7 +107,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
             return SameEnd(True, f"no jitters, of which one takes more than {LONGEST:g} s")
     words = ", ".join(f"{many} {status}" for status, many in ended.most_common())
     if off:
-        words += f", up to frame {min(reached)}" + (f" to {max(reached)}" if min(reached) < max(reached) else "")
+        words += f", up to frame {' to '.join(map(str, sorted({min(reached), max(reached)})))}"
         words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
     statuses = set(ended) - {"refused"}
     alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses
