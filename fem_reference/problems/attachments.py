@@ -15,41 +15,12 @@ from fem_reference.io import files
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
-_SAMPLES = np.array(
-    [
-        [1 / 3, 1 / 3, 1 / 3],
-        [0.6, 0.2, 0.2],
-        [0.2, 0.6, 0.2],
-        [0.2, 0.2, 0.6],
-        [0.45, 0.45, 0.1],
-        [0.45, 0.1, 0.45],
-        [0.1, 0.45, 0.45],
-    ]
-)
+_SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices of a muscle that an attachment of a case selects.
-
-    Parameters
-    ----------
-    case, i
-        The selection is that of ``scene.attachment[i]``.
-    surface
-        The surface of the muscle.
-    bone_surface
-        The surface of the attachment's bone.
-
-    Returns
-    -------
-    array (k,)
-        Indices of vertices of ``surface``, sorted.
-
-    Raises
-    ------
-    InputError
-            Names the unusable key of the case, or the file and row (comment lines not counted).
-
+    """The vertices (k,) of the muscle's ``surface``, sorted, that ``case.attachment[i]`` selects, with its ``bone_surface``;
+    InputError names the unusable key of the case, or the file and row (comment lines not counted).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -66,22 +37,9 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The facets of a mesh that lie under the attached part of a surface, although they do not follow its rim.
-
-    Parameters
-    ----------
-    mesh
-        Tetrahedra inside ``surface``.
-    surface
-        The surface that the attachment is defined on.
-    shares
-        Attached shares (k, 3) of the corners of the triangles of ``surface``.
-
-    Returns
-    -------
-    array (m, 3)
-        Boundary triangles of ``mesh``, outward, whose attached share, averaged over seven samples, is above a half.
-
+    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part, although they do
+    not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): those of the
+    corners of the triangles of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -124,16 +82,16 @@ def _quoted(text: str) -> str:
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
     """The patches spanned by the clouds of an outline, as one surface [mm]; ``place`` is the key of the clouds."""
     clouds = _clouds(path, outline.unit)
-    points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    patches = []
     for name in outline.clouds:
         if name not in clouds:
             raise InputError(place, f'"{name}", which {path} does not have', f"some of {', '.join(sorted(clouds))}")
         if len(clouds[name]) < 3:
             raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
-        spanned = fan(np.array(clouds[name]))
-        triangles = np.concatenate([triangles, spanned.triangles + len(points)])
-        points = np.concatenate([points, spanned.points])
-    return Surface(points, triangles, str(path))
+        patches.append(fan(np.array(clouds[name])))
+    starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
+    triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
+    return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
 
 
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:

@@ -19,26 +19,10 @@ TETS = 8000
 
 
 def of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case: traced, or given as polylines.
-
-    Parameters
-    ----------
-    case
-            Defines the fibres.
-    surface
-        The closed surface of the muscle.
-    fill
-            Fills the muscle with tetrahedra of a size [mm], in which fibres are traced.
-
-    Returns
-    -------
-    fibres, directions
-            The lines, and a callable for the direction at any point: that of the field, or of the nearest given line.
-
+    """The fibres of a case, and their direction at any point. They are given as polylines, with the direction of the nearest, or
+    traced in tetrahedra of a size [mm] with which ``fill`` fills the closed ``surface`` of the muscle.
     """
-    if case.fibres.polylines is not None:
-        given = case.fibres.polylines
-        lines = files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
+    if (lines := _given(case)) is not None:
         return inside(surface, lines), NearestLine(lines)
     traced = case.fibres.traced
     assert traced is not None  # a Fibres record has one of the two
@@ -52,14 +36,19 @@ def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
     it. It is the shear by their tension. 0 for fibres that are traced from one attachment to the other.
     """
-    if case.fibres.polylines is None:
+    if (lines := _given(case)) is None:
         return 0.0
-    given = case.fibres.polylines
-    lines = files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
     pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)
     lengths, along = np.linalg.norm(pieces, axis=1), np.abs(pieces @ axis)
     cosine = along / np.maximum(lengths, np.finfo(float).tiny)
     return float(np.sqrt((4 * cosine**2 * np.maximum(1 - cosine**2, 0)) @ lengths / lengths.sum()))
+
+
+def _given(case: MuscleCase) -> Polylines | None:
+    given = case.fibres.polylines
+    if given is None:
+        return None
+    return files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
