@@ -288,6 +288,6 @@ def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spen
     system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # the type that the stubs declare
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
-        return Multigrid(system, settings.element, spent)
+        return Multigrid(system, spent)
     precision = settings.precision or ("double" if kind == "direct" else "single")
     return Factorised(system.matrix, symmetric, kind == "lagged", precision, spent)

@@ -8,6 +8,7 @@ from pathlib import Path
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, fingerprint
 from fem_reference.problems.body import Body
+from fem_reference.runs.contents import frame_file
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.states import read_arrays
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -25,7 +26,7 @@ class Kept:
 
     def place(self, frame: float) -> Path:
         """The file of a frame."""
-        return self.folder / f"frame_{frame:04.0f}.npz"
+        return self.folder / frame_file(frame, ".npz")
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:

@@ -20,10 +20,9 @@ from fem_reference.solvers.fenicsx.processes import MARK
 from mpi4py import MPI  # isort: skip - after the door
 from fem_reference.solvers.fenicsx import compiling, assembled_field  # isort: skip
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
-from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
-from fem_reference.solvers.fenicsx.limit_points import ahead  # isort: skip
-from fem_reference.solvers.fenicsx.reactions import reactions  # isort: skip
+from fem_reference.solvers.fenicsx.modes import ahead, leave  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
+from fem_reference.solvers.fenicsx.system import reactions  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march  # isort: skip
 
