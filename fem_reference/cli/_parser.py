@@ -55,12 +55,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "N",
         "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
     },
-    "--workers": {
-        "type": int,
-        "default": 1,
-        "metavar": "N",
-        "help": "how many runs are made at once (default: 1)",
-    },
+    "--workers": {"type": int, "default": 1, "metavar": "N", "help": "how many runs are made at once (default: 1)"},
 }
 
 

@@ -15,12 +15,8 @@ from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.io import files
 from fem_reference.report import regression_texts
-from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Candidate
-from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
-from fem_reference.studies.execution import Bench
 
 HELP = "judge a candidate by its own past and by the reference, for a pipeline"
 
@@ -44,12 +40,13 @@ def run(options: argparse.Namespace) -> int:
     """Judge a candidate by its baseline, after having written that anew where it is asked for."""
     begin = time.perf_counter()
     scene = casefile.muscle(scene_of(options), "CASE")
-    chosen = choose(scene, options.candidate, options.unit)
-    check_names([chosen[0].name])
-    bench = checked_bench(scene, options, [chosen])
+    entry, place = choose(scene, options.candidate, options.unit)
+    check_names([entry.name])
+    bench = checked_bench(scene, options, [(entry, place)])
     # What is wrong with the baseline shows before anything is solved.
-    (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)
-    candidate, reference = _runs(bench, chosen)
+    (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
+    candidate = bench.obtain(entry.name, entry, place)  # first, as it may be bad input
+    reference = bench.reference()
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
@@ -58,15 +55,8 @@ def run(options: argparse.Namespace) -> int:
         _write({options.junit: lost.junit, options.markdown: lost.markdown})
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
-    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
+    bars = refinement.offered(bench, reference, asked=options.error_bar)
     return _printed(CurrentMeasures.of(scene, bench.setup(), candidate, reference, bars), options, begin)
-
-
-def _runs(bench: Bench[MuscleCase], chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
-    """The candidate, first as it may be bad input, and the reference."""
-    entry, place = chosen
-    candidate = bench.obtain(entry.name, entry, place)
-    return candidate, bench.obtain("reference", bench.scene.reference, "reference")
 
 
 def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float) -> int:
@@ -74,12 +64,8 @@ def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float
     if options.update:
         baseline.update(options.baseline, current)
     result = regression.check(baseline.read(options.baseline, current.scene, current.candidate.name), current)
-    _write(
-        {
-            options.junit: regression_texts.junit(result, time.perf_counter() - begin),
-            options.markdown: regression_texts.markdown(result),
-        }
-    )
+    junit = regression_texts.junit(result, time.perf_counter() - begin)
+    _write({options.junit: junit, options.markdown: regression_texts.markdown(result)})
     write_output(regression_texts.facts(result), regression_texts.text(result), options)
     return VERDICT_FAIL if result.word == "fail" else DONE
 

@@ -1,14 +1,24 @@
-"""The verb ``compare``: candidates against the reference."""
+"""The verb ``compare``: candidates against the reference, or one of them against what it was."""
 
 import argparse
 from pathlib import Path
 
 from fem_reference import solvers
-from fem_reference.cli._against import against
-from fem_reference.cli._choosing import choose, scene_of, with_limits
-from fem_reference.cli._judging import judge
+from fem_reference.assessment import baseline, versions
+from fem_reference.assessment.measured import CurrentMeasures
+from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of, with_limits
+from fem_reference.cli._pages import candidates, case_part, changes, judge, publish
 from fem_reference.cli._parser import share
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
+from fem_reference.report import against_page
+from fem_reference.report.asked import Asked, Part
+from fem_reference.runs.reached import complete
+from fem_reference.runs.store import Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Candidate, Case
+from fem_reference.solvers import recorded
+from fem_reference.studies import refinement
 
 HELP = "measure candidates against the reference and write the page"
 
@@ -39,4 +49,47 @@ def run(options: argparse.Namespace) -> int:
             raise InputError("--solver", f'"{name}"', f"one of {', '.join(known)}")
     wanted = [*(options.candidate or []), *options.solver] or [candidate.name for candidate in scene.candidate]
     chosen = [choose(scene, text, options.unit) for text in wanted]
-    return judge(scene, options, chosen) if options.against is None else against(scene, options, chosen)
+    return judge(scene, options, chosen) if options.against is None else _against(scene, options, chosen)
+
+
+def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Measure the one candidate and what it was, and write the page of what changed."""
+    scene = casefile.muscle(case, "--against")
+    if len(chosen) != 1:
+        raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")
+    if options.limit:
+        raise InputError("--limit", "with --against", "one of the two: check judges a candidate by its past")
+    ((entry, place),) = chosen
+    check_names([entry.name])
+    bench, path = checked_bench(scene, options, chosen), options.against
+    if path.is_file() and path.suffix == ".json":
+        before: Run | baseline.Baseline = baseline.read(path, scene, entry.name)
+    else:
+        before = bench.read("before", recorded.choice(path, options.unit, "--against"), "--against")
+    now, reference = bench.obtain(entry.name, entry, place), bench.reference()
+    if reference.outcome.status != "converged":
+        why = f"{reference.name}: {reference.outcome.status}, {reference.outcome.message}"
+        write_output({"case": scene.name, "notes": [why]}, f"{why}\nnothing can be compared", options)
+        return SOLVER_FAILED
+    bars = refinement.offered(bench, reference, asked=options.error_bar)
+
+    def measured(run: Run) -> CurrentMeasures:
+        return CurrentMeasures.of(scene, bench.setup(), complete(run, scene.numbers), reference, bars)
+
+    if isinstance(before, Run):
+        found = versions.of_runs(measured(now), measured(before), str(path))
+    else:
+        found = versions.of_baseline(measured(now), before, str(path))
+    asked = _asked(bench.scene, options, entry)
+    publish(
+        options, asked, against_page.page(found, bench.setup()), against_page.facts(found), against_page.text(found)
+    )
+    return DONE if now.outcome.status == "converged" else SOLVER_FAILED
+
+
+def _asked(case: Case, options: argparse.Namespace, entry: Candidate) -> Asked:
+    """The page of what changed, whose name states against what."""
+    path: Path = options.against
+    part = Part(("--against", str(path.resolve())), f"against_{path.stem if path.is_file() else path.resolve().name}")
+    who = candidates(case, [entry]) or (Part(("--candidate", entry.name), entry.name),)
+    return Asked("compare", case.name, (case_part(case), *changes(options), *who, part), "against")

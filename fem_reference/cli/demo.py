@@ -3,7 +3,7 @@
 import argparse
 
 from fem_reference.cli._choosing import own_candidates
-from fem_reference.cli._judging import judge
+from fem_reference.cli._pages import judge
 from fem_reference.cli._parser import share
 from fem_reference.scenes import casefile
 

@@ -10,9 +10,12 @@ from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_o
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
 from fem_reference.foundations.errors import InputError
+from fem_reference.report.words import duration
+from fem_reference.runs import states
+from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies import judging, kept_states, refinement
+from fem_reference.studies import judging, refinement
 from fem_reference.studies.execution import Bench
 
 HELP = "write all that a solver needs which is not ours, in open formats; or runs for ParaView"
@@ -55,10 +58,25 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
     chosen = [choose(case, text, options.unit) for text in options.candidate]
     check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(case, options, chosen)
-    reference = kept_states.reference(bench, again=options.solve)
+    reference = _with_states(bench, again=options.solve)
     runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
     result = judging.compare(bench, reference, runs, refinement.stored(reference))
     written = paraview.write(result, options.to)
     facts = {"case": case.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED
+
+
+def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
+    """The reference with its states, where its solver has any; InputError where it was solved without them and is not to be solved
+    ``again``.
+    """
+    choice = bench.scene.reference
+    if not hasattr(bench.settings(choice, "reference"), "store_state"):
+        return bench.reference()
+    known = bench.known("reference", choice.model_copy(update={"store_state": None}), "reference")
+    if known and known.folder and not again and not states.are_kept(known.folder, known.numbers):
+        took = duration(known.outcome.cost.get("seconds"))
+        got = f"a reference that was solved before without its states ({known.folder}), which stress and pressure follow from"
+        raise InputError("export", got, f"--solve, which solves it again (that took {took})")
+    return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

@@ -1,21 +1,21 @@
 """The verb ``page``: a page over several cases."""
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
 from fem_reference import report
 from fem_reference.assessment.claims import Cover
-from fem_reference.assessment.comparison import Comparison
 from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._pages import case_part, written
+from fem_reference.cli._pages import case_part, publish, status
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, field_page, ranking_page
-from fem_reference.report.asked import Asked, Part
+from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import judging, table_5_1, true_errors
@@ -61,24 +61,13 @@ def _examples(options: argparse.Namespace) -> int:
     cases = [casefile.read(name) for name in names]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
-        results = tuple(_compared(bench) for bench in benches)
-        path, lines = written(
-            options, Asked("page", options.name, (Part((options.name,)),)), field_page.page(title, results)
-        )
+        results = tuple(judging.judged(bench, own_candidates(bench.scene)) for bench in benches)
+    asked = Asked("page", options.name, (Part((options.name,)),))
+    path, lines = written(asked, field_page.page(title, results), out(options), options.page_name)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
-    if any(run.outcome.status != "converged" for result in results for run in result.runs):
-        return SOLVER_FAILED
-    return VERDICT_FAIL if any(result.word == "fail" for result in results) else DONE
-
-
-def _compared(bench: Bench[Case]) -> Comparison:
-    """The reference of a case and all its candidates."""
-    case = bench.scene
-    reference = bench.obtain("reference", case.reference, "reference")
-    others = [bench.obtain(entry.name, entry, place) for entry, place in own_candidates(case)]
-    return judging.compare(bench, reference, others)
+    return status(results)
 
 
 def _table(options: argparse.Namespace) -> int:
@@ -88,8 +77,13 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    _, lines = written(options, _asked(TABLE, scenes, foreign, options), ranking_page.page(table))
-    write_output(ranking_page.facts(table), "\n".join([ranking_page.text(table), *lines]), options)
+    more = [
+        Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}")
+        for case, found in foreign.items()
+        for one in found
+    ]
+    asked = _asked(scenes.values(), options, more)
+    publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
@@ -97,31 +91,19 @@ def _claims(options: argparse.Namespace) -> int:
     """Error bars beside errors."""
     scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
     found = true_errors.stake(scenes, out(options) / "runs")
-    _, lines = written(
-        options,
-        _asked(CLAIMS, {scene.name: scene for scene in scenes}, {}, options),
-        claims_page.page(found),
-    )
     whole = Cover.of(found.claims)
     covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"
     printed = [f"{whole.count} error bars: {covered}"]
     printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
-    write_output(claims_page.facts(found), "\n".join([*printed, *lines]), options)
+    asked = _asked(scenes, options)
+    publish(options, asked, claims_page.page(found), claims_page.facts(found), "\n".join(printed))
     return SOLVER_FAILED if found.missing else DONE
 
 
-def _asked(
-    page: str, scenes: dict[str, MuscleCase], foreign: dict[str, list[Candidate]], options: argparse.Namespace
-) -> Asked:
-    """The page over the cases that were asked for, with frames of other solvers."""
-    words = {name: case_part(scene).words[0] for name, scene in scenes.items() if options.case}
-    parts = [Part((page,)), *(Part(("--case", word), name) for name, word in words.items())]
-    parts += [
-        Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}")
-        for case, found in foreign.items()
-        for one in found
-    ]
-    return Asked("page", page, tuple(parts))
+def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:
+    """The page over the cases that were asked for."""
+    cases = [Part(("--case", case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
+    return Asked("page", options.name, (Part((options.name,)), *cases, *more))
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
@@ -131,15 +113,11 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
         case, equals, folder = text.partition("=")
         if not equals:
             raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
+        if not folder:
+            raise InputError("--candidate", '""', "a folder of frames")
         name = casefile.read_muscle(case).name
         if name not in cases:
             raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")
-        found.setdefault(name, []).append(_recorded(folder, options.unit))
+        found.setdefault(name, []).append(recorded.choice(Path(folder), options.unit, "--candidate"))
         check_names([candidate.name for candidate in found[name]])
     return found
-
-
-def _recorded(text: str, unit: str | None) -> Candidate:
-    if not text:
-        raise InputError("--candidate", '""', "a folder of frames")
-    return recorded.choice(Path(text), unit, "--candidate")

@@ -6,7 +6,7 @@ from fem_reference import solvers
 from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
-from fem_reference.cli._judging import judge, unturned
+from fem_reference.cli._pages import judge, unturned
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
@@ -43,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
     bench = Bench(scene, out(options) / "runs", options.ranks)
     solved = bench.obtain(*solvers.choice(scene, options.solver), f"--solver {options.solver}")
     result = alone(scene, bench.setup(), solved)
-    said = [run_text(solved, result), *unturned(options, result.word)]
-    write_output(of_run(scene, solved, result), "\n".join(said), options)
+    text = "\n".join([run_text(solved, result), *unturned(options, result.word)])
+    write_output(of_run(scene, solved, result), text, options)
     if solved.outcome.status != "converged":
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE

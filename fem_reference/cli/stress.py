@@ -3,15 +3,14 @@
 import argparse
 
 from fem_reference.assessment.stress import facts
-from fem_reference.cli._pages import written
+from fem_reference.cli._pages import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli._printing import DONE
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part
-from fem_reference.studies.hard import choosing, records, running
+from fem_reference.studies.hard import records, running
 
-PAGE = "stress"
 HELP = "run the hard cases by every solver, and write the page of who stays stable"
 
 
@@ -20,7 +19,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
-    parser.add_argument("--solver", default=[], choices=list(choosing.choices()), metavar="NAME", help=only)
+    parser.add_argument("--solver", default=[], choices=list(records.choices()), metavar="NAME", help=only)
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on so many other meshes of each case as well, a little different at random"
@@ -38,8 +37,8 @@ def run(options: argparse.Namespace) -> int:
     parts += [Part(("--solver", name), name) for name in options.solver]
     parts += [Part(("--steps",), "steps")] if options.steps else []
     parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
-    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), stress_page.page(found))
-    write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
+    asked = Asked("stress", "stress", tuple(parts))
+    publish(options, asked, stress_page.page(found), facts(found), stress_page.text(found))
     return DONE
 
 
@@ -48,8 +47,8 @@ def _check_reference(options: argparse.Namespace) -> None:
     if options.jitters < 0:
         raise InputError("--jitters", options.jitters, "0 or more")
     for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
-        if wanted and options.solver and choosing.REFERENCE not in options.solver:
+        if wanted and options.solver and records.REFERENCE not in options.solver:
             others = ", ".join(options.solver)
             raise InputError(
-                name, f"it with {others} alone", f"--solver {choosing.REFERENCE} too, which alone it is about"
+                name, f"it with {others} alone", f"--solver {records.REFERENCE} too, which alone it is about"
             )

@@ -1,14 +1,16 @@
 """The verb ``study``: what accuracy costs in time on cases."""
 
 import argparse
+from dataclasses import replace
 
 from fem_reference import solvers
 from fem_reference.assessment.cost_study import Study, facts
-from fem_reference.cli._pages import case_part, changes, written
+from fem_reference.cli._pages import case_part, changes, publish
 from fem_reference.cli._parser import CASE, share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, out
 from fem_reference.report import study_page
-from fem_reference.report.asked import Asked, Part
+from fem_reference.report.asked import Asked, Part, written
+from fem_reference.report.pages import Page
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost
@@ -35,25 +37,30 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
-    changes = dict(map(casefile.setting, options.set))
-    scenes = [casefile.read_muscle(case, changes) for case in options.cases]
+    given = dict(map(casefile.setting, options.set))
+    scenes = [casefile.read_muscle(case, given) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
+    pages = _pages(found, scenes, options)
+    for asked, page in pages[:-1]:
+        written(asked, page, out(options))
     printed = {"cases": [facts(case, found.origin) for case in found.cases], "missing": found.missing}
-    write_output(printed, "\n".join([study_page.text(found), *_written(found, scenes, options)]), options)
+    publish(options, *pages[-1], printed, study_page.text(found))
     return SOLVER_FAILED if found.missing else DONE
 
 
-def _written(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) -> list[str]:
-    """Write the pages, that of all cases last where there are several, which then has the name that was given."""
+def _pages(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) -> list[tuple[Asked, Page]]:
+    """The page of each case, and that of all of them last where there are several, or none."""
     more = [*changes(options), *(Part(("--solver", name), name) for name in options.solver)]
-    parts, several = {scene.name: case_part(scene) for scene in scenes}, len(found.cases) != 1
-    lines = list[str]()
-    for case in found.cases:
-        asked = Asked("study", case.case, (parts[case.case], *more), PAGE)
-        own = argparse.Namespace(**vars(options) | ({"page_name": None} if several else {}))
-        lines = written(own, asked, study_page.page(cost.alone(found, case)))[1]
-    if several:
+    parts = {scene.name: case_part(scene) for scene in scenes}
+    pages = [
+        (
+            Asked("study", case.case, (parts[case.case], *more), PAGE),
+            study_page.page(replace(found, cases=(case,), missing={})),
+        )
+        for case in found.cases
+    ]
+    if len(pages) != 1:
         named = [Part(part.words, name) for name, part in parts.items()]
-        lines = written(options, Asked("study", PAGE, (*named, *more)), study_page.page(found))[1]
-    return lines
+        pages.append((Asked("study", PAGE, (*named, *more)), study_page.page(found)))
+    return pages

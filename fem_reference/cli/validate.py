@@ -11,9 +11,8 @@ from fem_reference.problems import of_case
 from fem_reference.report.words import duration
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case
-from fem_reference.solvers.fenicsx import resources
-from fem_reference.studies import expected_cost
 from fem_reference.studies.execution import Bench
+from fem_reference.studies.features import expected
 
 HELP = "check all of a case that can be checked before it is solved, and say what running it will cost"
 
@@ -42,8 +41,7 @@ def _facts(bench: Bench[Case]) -> dict[str, Any]:
     scene, body = bench.scene, bench.problem().body
     known: dict[str, Any] = of_case.known(scene, bench.setup())
     if scene.reference.solver == "fenicsx" and body is not None:
-        element = str(bench.settings(scene.reference, "reference").model_dump()["element"])
-        seconds = duration(expected_cost.seconds(body, element))
-        known["unknowns"] = resources.unknowns(body.mesh, element)
-        known["cost"] = f"about {seconds} of processor time, within a factor of three, for {len(scene.numbers)} frames"
+        cost = expected(body, bench.settings(scene.reference, "reference"))
+        time = f"about {duration(cost.seconds)} of processor time, within a factor of three"
+        known |= {"unknowns": cost.unknowns, "cost": f"{time}, for {len(scene.numbers)} frames"}
     return known

@@ -4,9 +4,9 @@ import argparse
 import time
 
 from fem_reference.assessment.catalogue import Verification
-from fem_reference.cli._pages import written
+from fem_reference.cli._pages import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL
 from fem_reference.foundations.version import __version__
 from fem_reference.report import verify_page
 from fem_reference.report.asked import Asked, Part
@@ -28,14 +28,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure problems whose answers are known."""
     measured = _verify(options.names, options.negative_control)
-    # Measurements are printed even if the page fails.
-    write_output(verify_page.facts(measured), verify_page.text(measured), options)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
-    print(
-        *written(options, Asked("verify", "verify", tuple(parts)), verify_page.page(measured))[1],
-        sep="\n",
-    )
+    asked = Asked("verify", "verify", tuple(parts))
+    publish(options, asked, verify_page.page(measured), verify_page.facts(measured), verify_page.text(measured))
     return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)
 
 

@@ -8,21 +8,21 @@ import logging
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import partial
 from pathlib import Path
 
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.runs import store as runs
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
-from fem_reference.studies.run_folders import without_states
+from fem_reference.studies.scene_changes import without_states
 
 log = logging.getLogger(__name__)
 
@@ -30,6 +30,7 @@ log = logging.getLogger(__name__)
 ATTEMPTS = 3
 # A run that ended so ends so again; one that timed out or crashed may have had other reasons.
 _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
+_BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
 
 @dataclass(frozen=True)
@@ -63,18 +64,35 @@ class Made:
     @property
     def reached(self) -> Run | None:
         """The run, None where it did not reach all frames."""
-        return self.run if self.run is not None and self.run.outcome.status == "converged" else None
+        return self.run if self.outcome.status == "converged" else None
+
+    @property
+    def outcome(self) -> Outcome:
+        """The outcome of the run, ``"refused"`` where there is none."""
+        return self.run.outcome if self.run else Outcome("refused", self.failure)
+
+
+def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
+    """The results ``of`` scenes by name, and the reasons why others have none: InputError."""
+    found, missing = dict[str, T](), dict[str, str]()
+    for name, scene in scenes.items():
+        try:
+            found[name] = of(scene)
+        except InputError as error:
+            log.info("%s is left out: %s", name, error)
+            missing[name] = str(error)
+    return found, missing
 
 
 def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:
     """The runs of all ``trials``, in their order, from the ``store`` where they are, else solved now."""
-    if workers.count == 1 and workers.address is None:
-        made = []
-        for i, trial in enumerate(trials):
-            log.info("run %d of %d: %s", i + 1, len(trials), trial.label)
-            made.append(_made(trial, lambda trial=trial: solve(trial, store)))  # type: ignore[misc]
-        return tuple(made)
-    return _in_parallel(trials, store.absolute(), workers)
+    if workers.count > 1 or workers.address is not None:
+        return _in_parallel(trials, store.absolute(), workers)
+    made = []
+    for i, trial in enumerate(trials):
+        log.info("run %d of %d: %s", i + 1, len(trials), trial.label)
+        made.append(_made(trial, partial(solve, trial, store)))
+    return tuple(made)
 
 
 def solve(trial: Trial, store: Path) -> Run:
@@ -86,18 +104,14 @@ def solve(trial: Trial, store: Path) -> Run:
     return bench.obtain(trial.name, without_states(trial.choice), trial.name)
 
 
-@lru_cache(maxsize=2)
-def _kept(key: str, store: Path, case: str) -> list[Bench[MuscleCase]]:  # noqa: ARG001 - they are the key
-    """An empty list, the same each time: a case itself is no key."""
-    return []
-
-
 def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench, and so the tetrahedra, that runs on a case share in this process."""
-    kept = _kept(case.key, store, str(case.folder))
-    if not kept:
-        kept.append(Bench(case, store, ranks=1))
-    return kept[0]
+    """The bench, and so the tetrahedra, that runs on a case share in this process, which keeps two of them."""
+    key = case.key, store, case.folder
+    if key not in _BENCHES:
+        for old in list(_BENCHES)[:-1]:
+            del _BENCHES[old]
+        _BENCHES[key] = Bench(case, store, ranks=1)
+    return _BENCHES[key]
 
 
 def _made(trial: Trial, result: Callable[[], Run]) -> Made:
@@ -109,34 +123,39 @@ def _made(trial: Trial, result: Callable[[], Run]) -> Made:
 
 
 def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:
-    made, begin = dict[int, Made](), time.perf_counter()
+    made, begin, count = dict[int, Made](), time.perf_counter(), len(trials)
     for attempt in range(ATTEMPTS):
-        left = [i for i in range(len(trials)) if i not in made]
-        if not left:
+        wanted = [i for i in range(count) if i not in made]
+        if not wanted:
             break
         if attempt:
-            log.info("a worker ended before its time; %d runs are tried again", len(left))
+            log.info("a worker ended before its time; %d runs are tried again", len(wanted))
         try:
             with _executor(workers) as executor:
-                futures = {executor.submit(_stored, trials[i], store): i for i in left}
-                for i, one in _finished(futures, trials):
-                    made[i] = one
-                    _log(len(made), len(trials), one, begin)
+                futures = {executor.submit(_stored, trials[i], store): i for i in wanted}
+                for future in as_completed(futures):
+                    i = futures[future]
+                    made[i] = _made(trials[i], partial(_result, future, trials[i]))
+                    _log(made[i], len(made), count, time.perf_counter() - begin)
         except BrokenProcessPool:
             continue
-    lost = [Made(trial, None, f"its worker ended before its time, {ATTEMPTS} times") for trial in trials]
-    return tuple(made.get(i, lost[i]) for i in range(len(trials)))
-
-
-def _finished(futures: dict[Future[Path], int], trials: Sequence[Trial]) -> Iterator[tuple[int, Made]]:
-    """Each trial with its result as its future ends; the run itself is read from the store."""
-    for future in as_completed(futures):
-        i = futures[future]
-        yield i, _made(trials[i], lambda future=future, i=i: _loaded(future.result(), trials[i]))  # type: ignore[misc]
+    lost = f"its worker ended before its time, {ATTEMPTS} times"
+    return tuple(made.get(i, Made(trial, None, lost)) for i, trial in enumerate(trials))
 
 
 def _loaded(folder: Path, trial: Trial) -> Run:
     return replace(runs.load(folder), name=trial.name)
+
+
+def _result(future: Future[Path], trial: Trial) -> Run:
+    """The run of a worker, which is read from the store."""
+    return _loaded(future.result(), trial)
+
+
+def _log(one: Made, done: int, count: int, passed: float) -> None:
+    status = one.failure or one.outcome.status
+    left = f", about {passed / done * (count - done):.0f} s left" if done < count else ""
+    log.info("run %d of %d: %s: %s%s", done, count, one.trial.label, status, left)
 
 
 def _stored(trial: Trial, store: Path) -> Path:
@@ -146,26 +165,17 @@ def _stored(trial: Trial, store: Path) -> Path:
     return folder
 
 
-def _log(done: int, count: int, one: Made, begin: float) -> None:
-    passed = time.perf_counter() - begin
-    status = one.run.outcome.status if one.run else one.failure
-    left = f", about {passed / done * (count - done):.0f} s left" if done < count else ""
-    log.info("run %d of %d: %s: %s%s", done, count, one.trial.label, status, left)
-
-
-def _executor(workers: Workers) -> AbstractContextManager[Executor]:
+@contextmanager
+def _executor(workers: Workers) -> Iterator[Executor]:
+    """Processes of this machine, or the workers of a Dask scheduler, which hands the run of a worker that died to another one."""
     if workers.address is None:
         # Processes of their own and no forks: numba, PETSc and locks do not survive those.
-        return ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn"))
-    return _dask(workers.address)
-
-
-@contextmanager
-def _dask(address: str) -> Iterator[Executor]:
-    """The workers of a Dask scheduler; it hands what a worker that died was solving to another one by itself."""
+        with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
+            yield executor
+        return
     try:
         from distributed import Client
     except ImportError as error:
         raise MissingSoftware("Dask is not installed: pip install 'fem_reference[cluster]'") from error
-    with Client(address) as client, nullcontext(client.get_executor(retries=ATTEMPTS)) as executor:
-        yield executor
+    with Client(workers.address) as client:
+        yield client.get_executor(retries=ATTEMPTS)

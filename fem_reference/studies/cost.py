@@ -3,7 +3,6 @@
 import logging
 import math
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +14,16 @@ from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
-from fem_reference.runs.complete import complete
-from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import made_with
+from fem_reference.runs.reached import complete, seconds_per_frame
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
-from fem_reference.studies.campaign import Made, Workers, carry_out
+from fem_reference.studies.campaign import Made, Workers, carry_out, each
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
-from fem_reference.studies.resampled_scenes import carried, resample
+from fem_reference.studies.scene_changes import carried, resample
 from fem_reference.studies.true_errors import claims_of
 
 log = logging.getLogger(__name__)
@@ -45,14 +43,8 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
     """Study each of ``scenes`` with runs in ``store``, solved where that was not done before; ``only`` solvers of these
     names, where there are any.
     """
-    cases, missing = list[CaseStudy](), dict[str, str]()
-    for scene in scenes:
-        try:
-            cases.append(_of(scene, store, workers, only))
-        except InputError as error:
-            log.info("%s is left out: %s", scene.name, error)
-            missing[scene.name] = str(error)
-    return Study(tuple(cases), missing, made_with(str(workers)))
+    cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
+    return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:
@@ -65,35 +57,28 @@ def stored(folder: Path) -> list[CaseStudy]:
     return list(found.values())
 
 
-def alone(found: Study, case: CaseStudy) -> Study:
-    """The part of a study that is about one of its cases."""
-    return replace(found, cases=(case,), missing={})
-
-
 def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
     bench = Bench(case, store)
     log.info("%s: the truth", case.name)
-    truth = bench.obtain("reference", case.reference, "reference")
+    truth = bench.reference()
     if truth.outcome.status != "converged" or truth.fibres is None:
         raise InputError(case.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.bars(bench, truth, model=False)
-    context = context_of(bench.setup(), truth)
-    trials = list[Trial]()
-    if not only or case.reference.solver in only:
-        trials += reference_trials(case)
-    if not only or set(only) - {case.reference.solver}:
-        own = len(truth.surface.triangles)
-        others = [
-            (f"{4.0**power:g} times", resample(case, bench.setup(), power, store / SURFACES))
+    context, own = context_of(bench.setup(), truth), case.reference.solver
+    triangles = len(truth.surface.triangles)
+    trials = list(reference_trials(case)) if not only or own in only else []
+    if not only or set(only) - {own}:
+        others = {
+            f"{4.0**power:g} times": resample(case, bench.setup(), power, store / SURFACES)
             for power in _POWERS
-            if power < 0 or 4**power * own <= _MOST_TRIANGLES
-        ]
-        trials += [one for one in candidate_trials(case, dict(others)) if not only or one.choice.solver in only]
+            if power < 0 or 4**power * triangles <= _MOST_TRIANGLES
+        }
+        trials += [one for one in candidate_trials(case, others) if not only or one.choice.solver in only]
     made = carry_out(trials, store, workers)
     points = list[Point]()
     for i, one in enumerate(made):
         log.info("measuring run %d of %d: %s", i + 1, len(made), one.trial.label)
-        points.append(_point(case, one, truth, context))
+        points.append(_point(one, truth, context))
     size = case.muscle.tet_size / 2**case.muscle.refinements
     return CaseStudy(
         case=case.name,
@@ -103,7 +88,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
         units=metrics.units(),
         bars=known(bars),
         claims=_claims(made, truth, context, store),
-        triangles=len(truth.surface.triangles),
+        triangles=triangles,
         travel=context.travel,
         features=features(case, bench.setup()),
     )
@@ -117,18 +102,18 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 
-def _point(case: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
+def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
+    choice = {"solver": trial.choice.solver, **settings_of(trial)}
     return Point(
-        case=case.name,
-        solver=trial.choice.solver,
-        name=trial.name,
-        knob=trial.knob,
-        value=trial.value,
-        choice={"solver": trial.choice.solver, **settings_of(trial)}
-        | ({"scene": trial.changed} if trial.changed else {}),
-        status="refused" if run is None else run.outcome.status,
-        message=one.failure if run is None else run.outcome.message,
+        trial.scene.name,
+        trial.choice.solver,
+        trial.name,
+        trial.knob,
+        trial.value,
+        choice | ({"scene": trial.changed} if trial.changed else {}),
+        one.outcome.status,
+        one.outcome.message,
         errors={} if run is None else errors(run, truth, context),
         costs={} if run is None else costs(run),
     )
@@ -166,10 +151,9 @@ def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float
 def costs(run: Run) -> dict[str, float]:
     """Costs of a run: those of ``COSTS`` that are known, and seconds by phase."""
     cost = run.outcome.cost
-    each = seconds_per_frame(run)
-    found = {} if each is None else {"seconds_per_frame": each}
-    found |= {name: cost[name] for name in COSTS if name in cost}
-    return found | {name: value for name, value in cost.items() if name.startswith("seconds_")}
+    seconds = seconds_per_frame(run)
+    found = {} if seconds is None else {"seconds_per_frame": seconds}
+    return found | {name: value for name, value in cost.items() if name in COSTS or name.startswith("seconds_")}
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:

@@ -1,51 +1,38 @@
 """A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
 import logging
-import math
 import os
 import platform
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, cast, overload
+from typing import cast, overload
 
 from fem_reference import solvers
 from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
-from fem_reference.problems.watch import Watch
-from fem_reference.runs import cut_off, states, store
+from fem_reference.problems.stresses import Watch
+from fem_reference.runs import cut_off, store
 from fem_reference.runs.key import code_hash, key, versions
-from fem_reference.runs.store import Frame, Outcome, Run, collected
+from fem_reference.runs.store import Frame, Run, collected
 from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import AnySolver
-from fem_reference.studies import expected_cost, run_folders, watched
+from fem_reference.studies import making
+from fem_reference.studies.features import expected
+from fem_reference.studies.making import Wanted
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """A run that is wanted: the ``name`` that pages give it, who solves it with which ``settings``, and where it is stored."""
-
-    name: str
-    choice: SolverChoice
-    place: str
-    offer: AnySolver
-    settings: Record
-    folder: Path
 
 
 class Bench[C: Case]:
@@ -124,6 +111,10 @@ class Bench[C: Case]:
         assert run is not None  # what is not stored is made
         return run
 
+    def reference(self) -> Run:
+        """The run of the case's reference."""
+        return self.obtain("reference", self.scene.reference, "reference")
+
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""
         other = Bench(self.scene, self.store, self.ranks)
@@ -134,8 +125,11 @@ class Bench[C: Case]:
         """The stored run, or what ``make`` makes; with all effects that turn out to matter in it."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
+        offer = solvers.find(choice.solver, place, self.scene.task)
         while True:
-            run = self._stored(wanted := self._wanted(name, choice, place)) or make(wanted)
+            folder = self.folder(choice, place)
+            wanted = Wanted(name, choice, offer, self.settings(choice, place), folder)
+            run = self._stored(wanted) or make(wanted)
             found = () if run is None else self._turned_out(run)
             if run is None or not found:
                 return run
@@ -143,30 +137,24 @@ class Bench[C: Case]:
             self._begin()
             assert run.folder is not None  # from the store
             folder = self.folder(choice, place)
-            with run_folders.locked(folder):  # goes on from what is kept of a run that was stopped for it
+            with making.locked(folder):  # goes on from what is kept of a run that was stopped for it
                 cut_off.pass_on(run.folder, folder)
 
-    def _wanted(self, name: str, choice: SolverChoice, place: str) -> Wanted:
-        settings, offer = self.settings(choice, place), solvers.find(choice.solver, place, self.scene.task)
-        return Wanted(name, choice, place, offer, settings, self.folder(choice, place))
-
     def _stored(self, wanted: Wanted) -> Run | None:
-        run = _stored(wanted, self._ended(wanted.choice.solver))
+        run = wanted.stored(self._ended(wanted.choice.solver))
         return None if run is None else self._checked(run)
 
     def _made(self, wanted: Wanted) -> Run:
         """The run, solved now, by one process at a time; what is wrong with the input shows before anything is written."""
-        solver = wanted.choice.solver
         wanted.offer.require(wanted.settings)
         if wanted.choice == self.scene.reference:
             self.check()
         given = self.given(wanted.offer, wanted.settings)
         long = ""
-        if solver == "fenicsx" and given.body is not None:
-            element = str(wanted.settings.model_dump()["element"])
-            long = f", about {expected_cost.seconds(given.body, element):.2g} s of processor time"
+        if wanted.choice.solver == "fenicsx" and given.body is not None:
+            long = f", about {expected(given.body, wanted.settings).seconds:.2g} s of processor time"
         log.info("%s: no stored run of it in %s; solving%s", wanted.name, wanted.folder.parent.resolve(), long)
-        with run_folders.locked(wanted.folder), run_folders.bars_kept(wanted.folder):
+        with making.locked(wanted.folder), making.bars_kept(wanted.folder):
             return self._stored(wanted) or self._checked(self._solved(wanted, given))
 
     def _ended(self, solver: str) -> tuple[str, ...]:
@@ -185,17 +173,21 @@ class Bench[C: Case]:
         return self._watch() if solvers.takes_effects(solver) else None
 
     def _turned_out(self, run: Run) -> tuple[Decision, ...]:
-        """The effects that the case left out and that turn out to matter in a stored ``run``."""
+        """The effects that the case left out and that turn out to matter in a stored ``run``, at the first frame that shows one."""
         watch = self._watched(run.solver)
-        return () if watch is None or run.origin.get("watched") == watch.names else watched.again(watch, run)
+        if watch is None or run.origin.get("watched") == watch.names:
+            return ()
+        assert run.folder is not None  # from the store
+        return next(filter(None, making.seen(watch, run.folder, run.numbers)), ()) or watch.end()
 
     def _solved(self, wanted: Wanted, given: CaseSetup) -> Run:
         """The run of the problem that its solver is ``given``, written into its folder as it goes."""
-        origin = self.origin(wanted.choice.solver, wanted.settings)
+        solver = wanted.choice.solver
+        origin = self.origin(solver, wanted.settings)
         if wanted.offer.fills(wanted.settings):
             origin["mesh"] = self._problem().mesh_facts
-        identity = {"name": wanted.name, "solver": wanted.choice.solver, "origin": origin, "frames": self.scene.numbers}
-        _write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(wanted.choice.solver))
+        identity = {"name": wanted.name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
+        making.write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(solver))
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
@@ -235,65 +227,3 @@ class Bench[C: Case]:
             "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
-
-
-def _write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
-    """Solve, with each frame written as it is reached, and what all took; ``watch`` sees each frame, and may stop the run. Of a run
-    that failed before its first frame, that is the state at rest.
-    """
-
-    def add(frame: Frame) -> None:
-        writer.add(frame)
-        if watch is not None:
-            watched.see(watch, frame)
-
-    if watch is not None:
-        watched.begin(watch, writer)
-    forget_peak_memory()
-    began, solve, go_on = time.process_time(), wanted.offer.solve, wanted.offer.go_on
-    try:
-        sofar = (given, wanted.settings, add)
-        outcome = go_on(*sofar, writer.cut_off) if go_on else solve(*sofar)
-        if watch is not None and outcome.status == "converged":
-            watched.end(watch)
-    except watched.StoppedError as why:
-        outcome = Outcome("stopped", str(why))
-    processor, cost = time.process_time() - began, outcome.cost
-    if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
-        processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
-    used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()}
-    outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
-    if not writer.frames:
-        rest = given.rest
-        writer.add(Frame(given.frames[0], rest.surface.points, rest.fibres.points if rest.fibres else None))
-    names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
-    writer.close(outcome, **_contact(writer.state), **names)
-
-
-def _contact(state: dict[str, Any]) -> dict[str, str]:
-    """A note where contact was in the equations, of a run whose ``state`` says it."""
-    counts = state["scalars"].get("contact_points")
-    if counts is None:
-        return {}
-    pressed = [number for number, count in zip(state["numbers"], counts, strict=True) if count]
-    return {"contact": f"pressed first at frame {pressed[0]}" if pressed else "nothing was pressed at any frame"}
-
-
-def _stored(wanted: Wanted, ended: tuple[str, ...]) -> Run | None:
-    """The stored run that ``ended`` so, under the name that it has here; None where there is none, other packages made it, or it
-    lacks states that the settings ask for.
-    """
-    folder, name = wanted.folder, wanted.name
-    run = store.finished(folder, ended)
-    if run is None:
-        return None
-    now, then = versions(), run.origin.get("versions", {})
-    other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
-    if other:
-        log.info("%s: solved before, but with another %s; solving again", name, other[0])
-        return None
-    if getattr(wanted.settings, "store_state", None) and not states.are_kept(folder, run.numbers):
-        log.info("%s: solved before without its states; solving again", name)
-        return None
-    log.info("%s: solved before, taken from %s", name, folder)
-    return replace(run, name=name)

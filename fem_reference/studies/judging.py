@@ -1,16 +1,43 @@
-"""Runs of a case -> a comparison, whatever was solved."""
+"""Runs of a case -> a comparison, whatever was solved; of a scalar case with the convergence of its reference."""
 
-from collections.abc import Iterable
+import logging
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
+import numpy as np
+
+from fem_reference import solvers
 from fem_reference.assessment import comparison
-from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.runs.complete import complete
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import join
+from fem_reference.geometry.lagrange import l2_distance
+from fem_reference.problems import of_case, scalar
+from fem_reference.problems.of_case import CaseSetup
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.reached import complete
 from fem_reference.runs.store import Run
-from fem_reference.scenes.case import Case
-from fem_reference.studies import convergence
+from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.scalar import Element, ScalarCase
+from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
+
+log = logging.getLogger(__name__)
+
+_REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
+_MOST_CELLS = 100_000
+_EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
+
+
+def judged(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> Comparison:
+    """The reference of a case and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
+    read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
+    reference = bench.reference()
+    runs = [read.get(entry.name) or bench.obtain(entry.name, entry, place) for entry, place in chosen]
+    return compare(bench, reference, runs, refinement.offered(bench, reference, asked=error_bars))
 
 
 def compare(
@@ -20,4 +47,54 @@ def compare(
     case, setup = bench.scene, bench.setup()
     complete_runs = tuple(complete(run, case.numbers) for run in candidates)
     result = comparison.compare(case, setup, complete(reference, case.numbers), complete_runs, error_bars)
-    return replace(result, ladders=convergence.ladders(setup, case))
+    return replace(result, ladders=ladders(setup, case))
+
+
+def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
+    """The convergence of the reference solver of a ``case`` with elements of order 1 and 2, as far as its ``problem`` can be
+    refined here; nothing of a muscle, whose error bars say more.
+    """
+    return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
+
+
+def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
+    kind = coarse.mesh.cells.shape[1]
+    growth = 2 if kind == 2 else 4
+    levels = min(_REFINEMENTS[kind], int(math.log(_MOST_CELLS / len(coarse.mesh.cells), growth)))
+    if levels < 1:
+        return
+    settings = solvers.settings(case.reference, join(case.place, "reference"), "solve_field")
+    solver = solvers.find(case.reference.solver, case.place, "solve_field")
+
+    def solved(order: int, level: int) -> tuple[FieldProblem, Floats]:
+        element = Element(order=order, form=case.element.form)  # type: ignore[arg-type]
+        built = scalar.build(case.model_copy(update={"element": element}), level)
+        return built, solver.run(built, settings).values[0]
+
+    error, against = _error(case, lambda: solved(2, levels)[1])
+    for order in (1, 2):
+        # Without an exact solution the finest one of order 2 is what the others are measured against.
+        finest = levels if order == 1 or case.exact is not None else levels - 1
+        steps = [solved(order, level) for level in range(finest + 1)]
+        errors = tuple(error(*step) for step in steps)
+        scale = float(np.abs(steps[-1][1]).max())
+        exact = len(errors) < 2 or not errors[-1] > _EXACT * scale
+        measured = math.nan if exact else math.log2(errors[-2] / errors[-1])
+        log.info("%s: elements of order %d measured on %d meshes", case.name, order, len(steps))
+        yield Convergence(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
+
+
+def _error(case: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
+    """The error of a solution as a function of it, and the truth that this is measured against, in words."""
+    if case.exact is not None:
+        exact = partial(scalar.at, case.exact)
+        return (lambda built, values: l2_distance(built.mesh, values, exact)), "the exact solution (L2)"
+    # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
+    # own vertices alone converge with h^2 log h, and not with h^2.
+    truth = finest()
+
+    def rms(built: FieldProblem, values: Floats) -> float:
+        count = len(built.mesh.points)
+        return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
+
+    return rms, "the finest solution with P2 (rms at the vertices)"

@@ -58,19 +58,12 @@ def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
         bench, truth = shared_bench(case, store), wholes[0].reached
         context = None if truth is None or truth.fibres is None else context_of(bench.setup(), truth)
         bars, unknown = _bars(bench, truth)
-    made = list(zip(parted, others, strict=True))
-    ablations = (
-        _ablation(whole, [(part, other) for (own, part), other in made if own is whole], context) for whole in wholes
-    )
-    return CaseOmissions(
-        case.name,
-        case.title,
-        tuple(ablations),
-        {name: unit for name, unit in metrics.units().items() if name in MEASURES},
-        bars,
-        unknown,
-        made_with(str(workers)),
-    )
+    ablations = []
+    for whole in wholes:
+        made = [(part, other) for (own, part), other in zip(parted, others, strict=True) if own is whole]
+        ablations.append(_ablation(whole, made, context))
+    units = {name: unit for name, unit in metrics.units().items() if name in MEASURES}
+    return CaseOmissions(case.name, case.title, tuple(ablations), units, bars, unknown, made_with(str(workers)))
 
 
 def is_material(effect: Effect) -> bool:
@@ -146,13 +139,14 @@ def _warm_up(case: MuscleCase, store: Path) -> None:
     """
     bench = shared_bench(case, store)
     for trial in _wholes(case)[1:]:
+        if solvers.takes_effects(trial.choice.solver):
+            continue
         offer = solvers.find(trial.choice.solver, trial.name)
-        if not solvers.takes_effects(trial.choice.solver):
-            with suppress(InputError, MissingSoftware):  # of which its run says more
-                settings = bench.settings(trial.choice, trial.name)
-                offer.require(settings)
-                built: Any = bench.given(offer, settings)
-                offer.solve(replace(built, frames=built.frames[:2]), settings, lambda _: None)
+        with suppress(InputError, MissingSoftware):  # of which its run says more
+            settings = bench.settings(trial.choice, trial.name)
+            offer.require(settings)
+            built: Any = bench.given(offer, settings)
+            offer.solve(replace(built, frames=built.frames[:2]), settings, lambda _: None)
 
 
 def _limited(trial: Trial, whole: Made) -> Trial:
@@ -186,10 +180,16 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
     for part, other in others:
         changed = {} if context is None or one.run is None else changes(other, one.run, context)
         predicted = _predicted(trial.scene, part) if takes_effects else {}
-        found.append(replace(_omission(other, part.names), changes=changed, predicted=predicted))
+        found.append(_omission(other, part.names, changes=changed, predicted=predicted))
     named = {name for part in parts(trial) for name in part.names}
     kept = tuple(name for name in there if name not in named)
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
+
+
+def _omission(one: Made, left_out: tuple[str, ...], **measured: dict[str, float]) -> Omission:
+    """The end of a run and its cost, beside what was ``measured`` on it."""
+    end = one.outcome
+    return Omission(left_out, end.status, end.message, costs=dict(end.cost), instead=one.trial.changed, **measured)
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
@@ -199,14 +199,6 @@ def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
     (left_out,) = part.effects.values()
     (found,) = (one.indicator for one in of_case.explained(case) if one.effect is left_out)
     return {"surface_deviation.rms": found.estimate} if found else {}
-
-
-def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
-    """The end of a run and its cost."""
-    if one.run is None:
-        return Omission(left_out, "refused", one.failure, instead=one.trial.changed)
-    outcome = one.run.outcome
-    return Omission(left_out, outcome.status, outcome.message, costs=dict(outcome.cost), instead=one.trial.changed)
 
 
 def changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:

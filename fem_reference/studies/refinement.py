@@ -10,21 +10,31 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference import metrics, solvers
+from fem_reference.assessment import body_bars as body_differences
 from fem_reference.assessment import differences, error_bars
+from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Ints
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import context_of
-from fem_reference.runs.complete import complete
+from fem_reference.problems.body import Body
+from fem_reference.problems.finer import finer as on_finer_cells
+from fem_reference.runs.reached import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.run_folders import without_states
-from fem_reference.studies.scene_changes import on_tetrahedra, with_contact, with_distances, with_reference
+from fem_reference.studies.scene_changes import (
+    on_tetrahedra,
+    with_contact,
+    with_distances,
+    with_reference,
+    without_states,
+)
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +48,9 @@ RATIO = 1.5
 # Up to this share of the time of a reference its error bars are made without being asked for: a run on larger tetrahedra takes the
 # share of the time that these are of the number.
 CHEAP = 0.2
+
+# What is quadratic has as many unknowns on the same cells as what is linear on cells of half the size, and does not lock.
+_QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
 Vary = Callable[[MuscleCase], MuscleCase]
@@ -87,15 +100,15 @@ def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars
     return stored(reference) or obtain(bench, reference, model=model)
 
 
-def offered(bench: Bench[Case], reference: Run) -> ErrorBars | None:
-    """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
-    reference; else None, as of what did not converge or has no interior.
+def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | None:
+    """New error bars where they were ``asked`` for; else those that are stored, or new ones where they cost less than a fifth of
+    the reference, or None, as of a run that did not converge or has no interior.
     """
+    if asked:
+        return obtain(bench, reference)
     found = stored(reference)
-    if found is not None:
+    if found is not None or reference.outcome.status != "converged" or reference.fibres is None:
         return found
-    if reference.outcome.status != "converged" or reference.fibres is None:
-        return None
     own = bench.of_muscle()
     _, (fine, coarse) = coarser(own.scene)
     count = 1 + len(needed(own, reference))
@@ -208,3 +221,39 @@ def _tets(run: Run) -> float:
     """The number of tetrahedra of a run, NaN where it does not say."""
     tets = run.origin.get("mesh", {}).get("tets")
     return tets if isinstance(tets, float | int) else math.nan
+
+
+def body_bars(solved: Run) -> BodyBars | None:
+    """The error bars of a run by :func:`solve_body`; None where that did not converge."""
+    if solved.outcome.status != "converged":
+        log.info("error bars: none, of a body that did not converge")
+        return None
+    settings, body = solved.settings, solved.body
+    assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
+    assert body is not None
+    other, shared, changes, sharper = sharper_problem(body, settings)
+    log.info("error bars: solving with %s", sharper)
+    found = fenicsx.solve_body(other, settings.model_copy(update=changes))
+    if found.outcome.status != "converged":
+        log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
+    bars = body_differences.body_bars(solved.states, found.states, shared, sharper)
+    log.info("error bars: displacement is known to %.2g %% of itself at the last frame", 100 * bars.displacement[-1])
+    return bars
+
+
+def sharper_problem(
+    body: Body, settings: fenicsx.BodySettings
+) -> tuple[Body, Ints, dict[str, float | str | None], str]:
+    """A sharper problem: the body, indices of the points of ``body`` among its own, changes of the settings, and these in words."""
+    changes: dict[str, float | str | None] = {"store_state": False}
+    said = ""
+    if any("interval" in effect.needs for effect in body.effects):  # else a state does not depend on load steps
+        largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
+        changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
+        said = " and load steps of half the length"
+    quadratic = _QUADRATIC.get(settings.element)
+    if quadratic is not None:
+        changes |= {"element": quadratic, "quadrature_degree": None}
+        return body, np.arange(len(body.mesh.points)), changes, f"{quadratic} on the same cells{said}"
+    other, shared = on_finer_cells(body)
+    return other, shared, changes, f"{settings.element} on cells of half the size{said}"

@@ -7,15 +7,14 @@ from pathlib import Path
 
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
-from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
-from fem_reference.runs.complete import complete
-from fem_reference.runs.cost import seconds_per_frame
+from fem_reference.metrics import Measure, context_of, in_tables, measure
 from fem_reference.runs.key import versions
+from fem_reference.runs.reached import complete, seconds_per_frame
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
+from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
@@ -40,21 +39,16 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
     """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
     read before anything is solved.
     """
-    rows, scenarios, results, missing = solver_kinds(), list[Scenario](), list[SolverResult](), dict[str, str]()
+    rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {
         name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(name, [])]
         for name, bench in benches.items()
     }
-    for i, (name, bench) in enumerate(benches.items()):
-        log.info("scene %d of %d: %s", i + 1, len(benches), name)
-        try:
-            bench.setup()
-        except InputError as error:
-            log.info("%s is left out: %s", name, error)
-            missing[name] = str(error)
-            continue
-        scenario, found = _on(bench, rows, read[name])
+    there, missing = each(benches, lambda bench: bench.setup())
+    for i, name in enumerate(there):
+        log.info("scene %d of %d: %s", i + 1, len(there), name)
+        scenario, found = _on(benches[name], rows, read[name])
         scenarios.append(scenario)
         results += found
     if foreign:
@@ -68,10 +62,9 @@ def _on(
 ) -> tuple[Scenario, list[SolverResult]]:
     """The results of all solvers on the scene of a bench, the reference first."""
     scene = bench.scene
-    reference = complete(bench.obtain("reference", scene.reference, "reference"), scene.numbers)
+    reference = complete(bench.reference(), scene.numbers)
     bars = refinement.stored(reference)
-    assert reference.fibres is not None  # a reference has an interior
-    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
+    context = context_of(bench.setup(), reference)
     results = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     chosen = _chosen(scene, rows)
     for i, (kind, candidate, place) in enumerate(chosen):
@@ -95,11 +88,18 @@ def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Can
 
 
 def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
-    cost, machine = run.outcome.cost, str(run.origin["machine"])
+    cost = run.outcome.cost
     # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
-    each = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
-    seconds = seconds_per_frame(run) if each is None else each
-    numbers, outcome, is_reference = run.numbers, run.outcome, kind == REFERENCE
+    given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
     return SolverResult(
-        kind, run.name, run.solver, case.name, outcome, seconds, measures, numbers, machine, of_reference=is_reference
+        kind,
+        run.name,
+        run.solver,
+        case.name,
+        run.outcome,
+        seconds_per_frame(run) if given is None else given,
+        measures,
+        run.numbers,
+        str(run.origin["machine"]),
+        of_reference=kind == REFERENCE,
     )

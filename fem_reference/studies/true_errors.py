@@ -1,21 +1,20 @@
 """The finer solutions that error bars are compared with: on smaller tetrahedra, with finer contact."""
 
-import logging
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, change, context_of, measure
-from fem_reference.runs.complete import complete
+from fem_reference.runs.reached import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
+from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
-
-log = logging.getLogger(__name__)
 
 CASES = (
     "hip_flexion",
@@ -29,26 +28,19 @@ CASES = (
 
 def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
     """The claims of the references of ``scenes``, with runs in ``store``: solved where that was not done before."""
-    claims, sizes, missing = list[Claim](), dict[str, tuple[float, float]](), dict[str, str]()
-    for scene in scenes:
-        try:
-            found = _of(scene, store)
-        except InputError as error:
-            log.info("%s is left out: %s", scene.name, error)
-            missing[scene.name] = str(error)
-            continue
-        if not found:
-            missing[scene.name] = "its reference, or the finer solution, did not reach all frames"
-            continue
-        claims += found
-        size = scene.muscle.tet_size / 2**scene.muscle.refinements
-        sizes[scene.name] = (size, FINER * size)
-    return Claims(tuple(claims), sizes, missing)
+    named = {scene.name: scene for scene in scenes}
+    found, missing = each(named, partial(_of, store=store))
+    why = "its reference, or the finer solution, did not reach all frames"
+    missing |= {name: why for name, claims in found.items() if not claims}
+    muscles = {name: named[name].muscle for name, claims in found.items() if claims}
+    sizes = {name: one.tet_size / 2**one.refinements for name, one in muscles.items()}
+    pairs = {name: (size, FINER * size) for name, size in sizes.items()}
+    return Claims(tuple(chain(*found.values())), pairs, missing)
 
 
 def _of(case: MuscleCase, store: Path) -> list[Claim]:
     bench = Bench(case, store)
-    reference = bench.obtain("reference", case.reference, "reference")
+    reference = bench.reference()
     bars = refinement.bars(bench, reference)
     if bars is None:
         return []

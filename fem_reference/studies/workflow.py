@@ -19,7 +19,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import arguments, body_refinement, judging, refinement
+from fem_reference.studies import arguments, judging, refinement
 from fem_reference.studies.execution import Bench
 
 STORE = Path("reports/runs")
@@ -155,11 +155,11 @@ def error_bars(
     arguments.check_progress(progress)
     with reported(progress):
         if arguments.is_of_body(reference, case):
-            return body_refinement.obtain(reference)
+            return refinement.body_bars(reference)
         muscle = casefile.muscle(arguments.check_case(case))
         arguments.check_run(reference, muscle, "reference")
         bench = Bench(muscle, arguments.free_folder(store, "store"))
-        return refinement.stored(reference) or refinement.obtain(bench, reference)
+        return refinement.bars(bench, reference)
 
 
 def compare(

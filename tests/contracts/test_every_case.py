@@ -14,7 +14,7 @@ from fem_reference.report import pages
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.scenes.scalar import ScalarCase
-from fem_reference.studies import convergence
+from fem_reference.studies import judging
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +54,7 @@ def solved_quickly(name: str, changes: dict[str, object], **more: bool):
 
 def whole(name: str, *, with_negative_control: bool, folder, monkeypatch) -> tuple[int, dict]:
     """Exit status and facts of a scalar case with all its candidates; how it converges is for its page."""
-    monkeypatch.setattr(convergence, "_REFINEMENTS", {2: 0, 3: 0})
+    monkeypatch.setattr(judging, "_REFINEMENTS", {2: 0, 3: 0})
     scene = casefile.read(name, with_negative_control=with_negative_control)
     return run(scene, folder, monkeypatch, verb="compare")
 
@@ -78,7 +78,7 @@ def test_scalar_cases_by_the_listing_alone(name, tmp_path, monkeypatch) -> None:
 
 
 def test_the_page_of_the_octave_examples(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(convergence, "_MOST_CELLS", 30_000)  # one refinement fewer: a quarter of the time
+    monkeypatch.setattr(judging, "_MOST_CELLS", 30_000)  # one refinement fewer: a quarter of the time
     target = tmp_path / "facts.json"
     status = cli.main(["page", "octave-examples", "--out", str(tmp_path), "--json", str(target), "--quiet"])
     facts = json.loads(target.read_text())

@@ -1,4 +1,4 @@
-"""What a case is like as numbers: by them a recommendation chooses what was studied."""
+"""Numbers that are known of a case: by them a recommendation chooses what was studied, and a reference has an expected time."""
 
 import math
 from pathlib import Path
@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 import small
 
+import fem_reference as fr
 from fem_reference.problems import muscle
+from fem_reference.problems.body import Body
 from fem_reference.scenes import casefile
-from fem_reference.studies.features import features
+from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx import resources
+from fem_reference.studies.features import expected, features
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 
@@ -48,3 +52,33 @@ def test_every_law_counts_with_its_shear_modulus(tmp_path: Path) -> None:
     other = casefile.read_muscle(path.parent)
     assert type(other.effects[0]).__name__ == "MooneyRivlin"
     assert features(other, rest) == pytest.approx(features(scene, rest), rel=1e-12)
+
+
+def seconds(body: Body, element: str) -> float:
+    return expected(body, fenicsx.BodySettings(element=element)).seconds
+
+
+def body(count: int, frames: tuple[float, ...] = (0.0, 1.0)) -> Body:
+    """A cube of ``count`` cells along each edge, each cut into tetrahedra."""
+    cells = fr.box((count,) * 3, (10.0, 10.0, 10.0), "tetrahedron")
+    return fr.Body(cells, (fr.make_effect("neo_hooke", mu=0.01),), (), frames=frames)
+
+
+def test_one_frame_of_what_was_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four iterations of 0.13 s with 5456 unknowns."""
+    monkeypatch.setattr(resources, "unknowns", lambda *_: 5456)
+    assert seconds(body(1), "P2/P1") == pytest.approx(0.52)
+
+
+def test_each_frame_after_the_first_takes_as_long() -> None:
+    one = seconds(body(2), "P2/P1")
+    assert seconds(body(2, (0.0, 1.0, 2.0, 5.0)), "P2/P1") == pytest.approx(3 * one)
+
+
+def test_more_unknowns_take_more_than_in_proportion() -> None:
+    """And less than with their square, on smaller cells and in richer elements alike."""
+    for (few, element), (many, other) in (((2, "P2/P1"), (4, "P2/P1")), ((3, "P1/P1"), (3, "P2/P1"))):
+        small, large = body(few), body(many)
+        ratio = resources.unknowns(large.mesh, other) / resources.unknowns(small.mesh, element)
+        longer = seconds(large, other) / seconds(small, element)
+        assert ratio < longer < ratio**2

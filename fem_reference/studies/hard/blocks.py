@@ -20,7 +20,7 @@ from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import MuscleProblem, solid, spring_skins
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.scenes.bones import CaseBone
+from fem_reference.scenes.muscle import CaseBone
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.
@@ -33,7 +33,7 @@ _SAME = 1e-9  # of the block's size: rounding of what two holds do alike
 
 def problem(hard: Hard) -> MuscleProblem:
     """The problem that the block of ``hard`` poses."""
-    block, frames = hard.block, hard.frames
+    block, frames, acting = hard.block, hard.frames, hard.effect or MATERIAL
     assert block is not None  # a Hard record with a block has frames
     assert frames is not None
     nodes, tets = kuhn(block.cells)
@@ -44,7 +44,9 @@ def problem(hard: Hard) -> MuscleProblem:
     ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
     _check_held(hard, ends, surface)
     bones = tuple(end.bone for end in ends) + tuple(_bone(hard, i, surface) for i in range(len(hard.bone)))
-    start = _start(block, hard.start)
+    size = np.asarray(block.size)
+    middle, cell = np.asarray(block.corner) + size / 2, float((size / block.cells).min())
+    start = Moved(hard.start, middle, cell) if hard.start else None
     setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval, start=start)
     facets: dict[str, Ints] = {
         face: index[triangles[np.isin(triangles, _on(block, skin_nodes, face)).all(axis=1)]] for face in FACES
@@ -54,8 +56,7 @@ def problem(hard: Hard) -> MuscleProblem:
             facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
     if not tet_volumes(points, tets).min() > 0:
         raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
-    mesh = TetMesh(points, tets, facets, maker="lattice")
-    return _problem(block, setup, mesh, hard.effect or MATERIAL)
+    return _filled(block, setup, TetMesh(points, tets, facets, maker="lattice"), acting)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,19 +81,12 @@ class Moved:
         return np.asarray(points + self.start.amount * self.cell * moves.reshape(-1, 3))
 
 
-def _start(block: Lattice, start: Start | None) -> Moved | None:
-    if start is None:
-        return None
-    size = np.asarray(block.size)
-    return Moved(start, np.asarray(block.corner) + size / 2, float((size / block.cells).min()))
-
-
-def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> MuscleProblem:
-    if among(acting) is not None:
+def _filled(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> MuscleProblem:
+    pressed = among(acting) is not None
+    if pressed:
         check_exempt(setup.exempt, "hold")
     apart = block.points_apart or spacing(setup.surface)
     x, y, z = (np.asarray(block.fibre) / np.linalg.norm(block.fibre)).tolist()
-    fibre = Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None
     return MuscleProblem(
         setup.surface,
         setup.bones,
@@ -104,28 +98,24 @@ def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.
         fibres=_lines(block),
         mesh_facts={},
         seconds=0.0,
-        fibre=fibre,
+        fibre=Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None,
         start=setup.start,
-        skin=None if among(acting) is None else free_skin(setup.exempt, mesh, apart),
+        skin=free_skin(setup.exempt, mesh, apart) if pressed else None,
         attached_skins=spring_skins(setup, mesh, apart),
     )
 
 
 def _placed(block: Lattice, nodes: Ints) -> Floats:
-    """Positions [mm] of the lattice's ``nodes`` (n, 3)."""
-    axes = [_ticks(count, ratio) for count, ratio in zip(block.cells, block.grading, strict=True)]
-    shares = np.column_stack([ticks[nodes[:, k]] for k, ticks in enumerate(axes)])
+    """Positions [mm] of the lattice's ``nodes`` (n, 3); the last cell along an axis is ``grading`` times as long as the first."""
+    shares = np.empty(nodes.shape)
+    for k, (count, ratio) in enumerate(zip(block.cells, block.grading, strict=True)):
+        lengths = ratio ** (np.arange(count) / max(count - 1, 1))
+        shares[:, k] = np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])[nodes[:, k]]
     if block.jitter:
         random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
         random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, and edges and corners where they are
-        shares = shares + random
+        shares += random
     return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))
-
-
-def _ticks(count: int, ratio: float) -> Floats:
-    """Shares from 0 to 1 in ``count`` cells, the last of them ``ratio`` times as long as the first."""
-    lengths = ratio ** (np.arange(count) / max(count - 1, 1))
-    return np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
@@ -135,16 +125,15 @@ def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
 
 
 def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVertices:
-    axis, high = "xyz".index(hold.face[0]), hold.face[1] == "1"
+    axis, largest = "xyz".index(hold.face[0]), max(block.size)
     vertices = _on(block, nodes, hold.face)
     if hold.middle:
         off = np.abs(nodes[vertices] - np.asarray(block.cells) / 2)
         off[:, axis] = 0
         vertices = vertices[[np.argmin(off.sum(axis=1))]]
-    largest = max(block.size)
-    away = np.zeros(3)
-    away[axis] = (1 if high else -1) * _AWAY * largest
-    x, y, z = (surface.points.mean(axis=0) + away).tolist()
+    centre = surface.points.mean(axis=0)
+    centre[axis] += (1 if hold.face[1] == "1" else -1) * _AWAY * largest
+    x, y, z = centre.tolist()
     ball = Sphere((x, y, z), _BALL * largest)
     motion = hold.motion.poses() if hold.motion else None
     bone = Bone(f"bone of {hold.face}", tessellated(ball, surface.points, "hold"), motion, solid=ball)
@@ -176,10 +165,9 @@ def _bone(hard: Hard, i: int, surface: Surface) -> Bone:
 def _lines(block: Lattice) -> Polylines:
     """Straight lines through the block along its fibres' greatest axis."""
     axis = int(np.argmax(np.abs(block.fibre)))
-    shares = np.full((_LINES, _POINTS, 3), 0.5)
+    shares = np.empty((_LINES, _POINTS, 3))
     shares[:, :, axis] = np.linspace(0.05, 0.95, _POINTS)
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    shares[:, :, one] = np.array([0.3, 0.3, 0.7, 0.7])[:, None]
-    shares[:, :, other] = np.array([0.3, 0.7, 0.3, 0.7])[:, None]
+    shares[:, :, (axis + 1) % 3] = np.array([0.3, 0.3, 0.7, 0.7])[:, None]
+    shares[:, :, (axis + 2) % 3] = np.array([0.3, 0.7, 0.3, 0.7])[:, None]
     points = np.asarray(block.corner) + shares.reshape(-1, 3) * np.asarray(block.size)
     return Polylines(points, np.arange(0, _LINES * _POINTS + 1, _POINTS))

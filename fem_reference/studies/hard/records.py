@@ -17,15 +17,20 @@ from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
 from fem_reference.scenes import casefile
-from fem_reference.scenes.bones import CaseBone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
-from fem_reference.scenes.muscle import Frames
-from fem_reference.studies.hard.choosing import choices, task_of
+from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
 _MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
+REFERENCE, SECOND = "fenicsx", "scikit_fem"
+LIMIT = 120.0  # [s] of processor time of a run
+_OWN: dict[str, dict[str, Any]] = {
+    REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
+    SECOND: {},
+    "line_of_action": {},
+}
 
 
 class Lattice(Record):
@@ -166,6 +171,19 @@ class Hard(Record):
         return SolverChoice(**{"solver": defaults.solver, **defaults.settings, **changes})
 
 
+def choices() -> dict[str, SolverChoice]:
+    """Settings for hard cases, by solver: its own here, else those of the first candidate of Table 5.1 that has it."""
+    found = {name: SolverChoice(solver=name, **settings) for name, settings in _OWN.items()}
+    for candidate in solvers.in_table():
+        found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
+    return {name: found[name] for name in (REFERENCE, SECOND, *sorted(set(found) - {REFERENCE, SECOND}))}
+
+
+def task_of(solver: str, task: Task) -> Task:
+    """The task that a solver is asked for in a case of a ``task``: the second solver has none for muscles but that of bodies."""
+    return "solve_body" if task == "solve" and solver == SECOND else task
+
+
 def folders() -> list[str]:
     """The folders of hard cases that there are."""
     return sorted(path.parent.name for path in FOLDER.glob("*/case.toml"))
@@ -174,34 +192,31 @@ def folders() -> list[str]:
 def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
     """Every hard case, or those of folders or variants of these ``names``; InputError where there is none of a name."""
     found = [hard for folder in folders() for hard in read(FOLDER / folder / "case.toml")]
+    own = [{hard.name, hard.name.partition(".")[0]} for hard in found]
     for name in names:
-        if not any(_named(hard, name) for hard in found):
+        if not any(name in one for one in own):
             raise InputError("NAME", f'"{name}"', f"one of {', '.join(folders())}")
-    return tuple(hard for hard in found if not names or any(_named(hard, name) for name in names))
-
-
-def _named(hard: Hard, name: str) -> bool:
-    return name in (hard.name, hard.name.partition(".")[0])
+    return tuple(hard for hard, one in zip(found, own, strict=True) if not names or one & set(names))
 
 
 def read(path: Path) -> Iterator[Hard]:
     """The hard case in a file, or its variants: each is the file with the keys of a ``[[variant]]`` in their place. InputError
     where any of it cannot be posed to a solver as it is written.
     """
-    table = texts.toml(path)
-    given = "variant" in table
-    variants = table.pop("variant", [{}])
+    table, folder = texts.toml(path), path.parent.name
+    if "variant" not in table:
+        yield _hard(table, folder, str(path))
+        return
+    variants = table.pop("variant")
     if not isinstance(variants, list) or not variants or not all(isinstance(one, dict) for one in variants):
         raise InputError(join(str(path), "variant"), repr(variants), "tables, [[variant]] each")
     found = set[str]()
     for i, variant in enumerate(variants):
-        where = join(str(path), f"variant[{i}]") if given else str(path)
-        label = variant.get("name", "")
-        if given and (not isinstance(label, str) or not label or label in found):
+        where, label = join(str(path), f"variant[{i}]"), variant.pop("name", "")
+        if not isinstance(label, str) or not label or label in found:
             raise InputError(join(where, "name"), repr(label), "a name of its own")
         found.add(label)
-        name = f"{path.parent.name}.{label}" if label else path.parent.name
-        yield _hard(_merged(table, {key: value for key, value in variant.items() if key != "name"}), name, where)
+        yield _hard(_merged(table, variant), f"{folder}.{label}", where)
 
 
 def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
@@ -248,8 +263,5 @@ def _check_solvers(hard: Hard, task: Task) -> None:
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """``table`` with the keys of ``changes`` in place of its own, tables key by key."""
-    found = dict(table)
-    for key, value in changes.items():
-        both = isinstance(value, dict) and isinstance(found.get(key), dict)
-        found[key] = _merged(found[key], value) if both else value
-    return found
+    both = [key for key, value in changes.items() if isinstance(value, dict) and isinstance(table.get(key), dict)]
+    return table | changes | {key: _merged(table[key], changes[key]) for key in both}

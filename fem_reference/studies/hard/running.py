@@ -3,6 +3,7 @@
 import logging
 import re
 import signal
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,11 +25,10 @@ from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
-from fem_reference.studies.hard import blocks, jitters, steps
-from fem_reference.studies.hard.choosing import LIMIT, REFERENCE, SECOND, choices
+from fem_reference.studies.hard import blocks, repeats
 from fem_reference.studies.hard.following import follow
-from fem_reference.studies.hard.records import Hard
-from fem_reference.studies.hard.steps import SameEnd, StalledError
+from fem_reference.studies.hard.records import LIMIT, REFERENCE, SECOND, Hard, choices
+from fem_reference.studies.hard.repeats import SameEnd, StalledError
 
 log = logging.getLogger(__name__)
 
@@ -60,10 +60,6 @@ class Posed:
         assert shipped is not None  # a Hard record has one of the two
         case = shipped.read()
         return of_case.problem(case, of_case.setup(case))
-
-    def is_reference(self, solver: str) -> bool:
-        """True of the solver whose runs of a muscle others are measured against."""
-        return solver == REFERENCE and self.problem.muscle is not None
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
@@ -119,20 +115,18 @@ def _limited(seconds: float) -> Iterator[None]:
     def stalled(*_: object) -> None:
         raise StalledError(f"more than {CLOCK * seconds:g} s by the clock, and not {seconds:g} s of processor time")
 
-    timers = ((signal.ITIMER_PROF, signal.SIGPROF, late, 1), (signal.ITIMER_REAL, signal.SIGALRM, stalled, CLOCK))
-    try:
-        before = [signal.signal(number, handler) for _, number, handler, _ in timers]
-    except ValueError:  # in another thread
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
+    timers = ((signal.ITIMER_PROF, signal.SIGPROF, late, 1), (signal.ITIMER_REAL, signal.SIGALRM, stalled, CLOCK))
+    before = [signal.signal(number, handler) for _, number, handler, _ in timers]
     try:
         for timer, _, _, longer in timers:
             signal.setitimer(timer, longer * seconds)
         yield
     finally:
-        for timer, *_ in timers:
+        for (timer, number, _, _), handler in zip(timers, before, strict=True):
             signal.setitimer(timer, 0)
-        for (_, number, _, _), handler in zip(timers, before, strict=True):
             signal.signal(number, handler)
 
 
@@ -142,7 +136,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     if posed.problem.field is not None:  # settings for bodies do not matter there
         choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
     outcome, followed = follow(posed.problem, choice)
-    if posed.is_reference(solver) and outcome.status == "converged":
+    if solver == REFERENCE and posed.problem.muscle is not None and outcome.status == "converged":
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
@@ -170,14 +164,14 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
     """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
     hard, muscle = posed.hard, posed.problem.muscle
-    if muscle is None or not posed.is_reference(choice.solver):
+    if muscle is None or choice.solver != REFERENCE:
         return
-    wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
+    wanted = hard.steps or (repeats.farthest(followed) if posed.in_steps and hard.start is None else None)
     if wanted is not None:
-        yield steps.compare(muscle, choice, wanted)
+        yield repeats.in_steps(muscle, choice, wanted)
     if posed.jitters:
         first = outcome, followed
-        yield jitters.compare(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
+        yield repeats.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:

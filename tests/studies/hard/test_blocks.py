@@ -5,7 +5,7 @@ import pytest
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
-from fem_reference.studies.hard import blocks, choosing, records, running
+from fem_reference.studies.hard import blocks, records, running
 
 CASES = {hard.name: hard for hard in records.read_all()}
 
@@ -29,7 +29,7 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
             InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves other"
         ):
             blocks.problem(torn)
-        found = running.cell(running.Posed(torn), choosing.choices()["pbd"])
+        found = running.cell(running.Posed(torn), records.choices()["pbd"])
         assert (found.verdict, "moves otherwise" in found.sentence) == ("refused", True)
     # Faces that move alike may meet, as may the middle of one.
     alike = (top, top.model_copy(update={"face": "x0"}))

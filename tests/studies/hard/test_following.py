@@ -9,9 +9,9 @@ from fem_reference.problems import of_case
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import pbd
-from fem_reference.studies.hard import blocks, choosing, records
+from fem_reference.studies.hard import blocks, records
 from fem_reference.studies.hard.following import follow
-from fem_reference.studies.hard.steps import StalledError
+from fem_reference.studies.hard.repeats import StalledError
 
 CASES = {hard.name: hard for hard in records.read_all()}
 
@@ -22,7 +22,7 @@ def test_at_rest_a_surface_stays_where_it_is(solver: str) -> None:
     if solver == "scikit_fem":  # it takes up to 200 tetrahedra
         small = CASES["at_rest.millimetres"].block.model_copy(update={"cells": (2, 2, 3)})
         problem = blocks.problem(CASES["at_rest.millimetres"].model_copy(update={"block": small}))
-    outcome, followed = follow(problem, choosing.choices()[solver])
+    outcome, followed = follow(problem, records.choices()[solver])
     assert outcome.status == "converged"
     assert followed.numbers == problem.frames
     assert np.abs(followed.positions - problem.surface.points).max() < 1e-6
@@ -33,12 +33,12 @@ def test_a_body_of_many_tetrahedra_is_too_large_for_the_second_solver() -> None:
     block = CASES["at_rest.millimetres"].block.model_copy(update={"cells": (4, 4, 8)})
     problem = blocks.problem(CASES["at_rest.millimetres"].model_copy(update={"block": block}))
     with pytest.raises(InputError, match="got 768 tetrahedra, want at most 200"):
-        follow(problem, choosing.choices()["scikit_fem"])
+        follow(problem, records.choices()["scikit_fem"])
 
 
 def test_a_solver_that_moves_lines_has_no_health() -> None:
     with pytest.raises(InputError, match="got a solver that moves lines, want one that moves a surface"):
-        follow(blocks.problem(CASES["at_rest.millimetres"]), choosing.choices()["line_of_action"])
+        follow(blocks.problem(CASES["at_rest.millimetres"]), records.choices()["line_of_action"])
 
 
 def test_a_field_has_the_range_of_its_boundary_values() -> None:
@@ -54,8 +54,8 @@ def test_a_field_has_the_range_of_its_boundary_values() -> None:
 def test_what_is_solved_at_no_frame_is_where_it_rests(monkeypatch: pytest.MonkeyPatch) -> None:
     stand_ins.solve_by(monkeypatch, pbd, lambda *_: Outcome("diverged", "at once"))
     problem = blocks.problem(CASES["at_rest.millimetres"])
-    followed = follow(problem, choosing.choices()["pbd"])[1]
+    followed = follow(problem, records.choices()["pbd"])[1]
     assert np.array_equal(followed.positions, problem.surface.points[None])
     stand_ins.solve_by(monkeypatch, pbd, lambda *_: Outcome("stalled", "busy"))
     with pytest.raises(StalledError, match="busy"):
-        follow(problem, choosing.choices()["pbd"])
+        follow(problem, records.choices()["pbd"])

@@ -1,10 +1,10 @@
-"""Files of hard cases: every folder is whole, and a mistake is named with its key."""
+"""Files of hard cases: every folder is whole, and a mistake is named with its key; and the settings of their solvers."""
 
 import pytest
 
 from fem_reference import solvers
 from fem_reference.foundations.errors import InputError
-from fem_reference.studies.hard import choosing, records
+from fem_reference.studies.hard import records
 
 CASES = {hard.name: hard for hard in records.read_all()}
 
@@ -21,10 +21,10 @@ def test_a_name_that_is_not_there() -> None:
 
 @pytest.mark.parametrize("hard", [hard for hard in CASES.values() if hard.block], ids=lambda hard: hard.name)
 def test_every_setting_that_a_case_changes_is_one_of_its_solver(hard) -> None:
-    assert set(hard.settings) <= set(choosing.choices())
-    assert set(hard.only) <= set(choosing.choices())
-    for choice in choosing.choices().values():
-        solvers.settings(hard.choice(choice), hard.place, choosing.task_of(choice.solver, "solve"))
+    assert set(hard.settings) <= set(records.choices())
+    assert set(hard.only) <= set(records.choices())
+    for choice in records.choices().values():
+        solvers.settings(hard.choice(choice), hard.place, records.task_of(choice.solver, "solve"))
 
 
 BLOCK = """
@@ -100,3 +100,19 @@ def test_a_wrong_file_is_refused(text, message, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(InputError, match=message):
         list(records.read(tmp_path / "case.toml"))
+
+
+def test_the_reference_comes_first_and_every_solver_of_muscles_is_there() -> None:
+    found = records.choices()
+    assert list(found)[:2] == [records.REFERENCE, records.SECOND]
+    assert set(solvers.names("solve")) - {"recorded"} <= set(found)
+    assert "recorded" not in found
+
+
+@pytest.mark.parametrize(
+    ("solver", "task", "asked"),
+    [("pbd", "solve", "solve"), ("scikit_fem", "solve", "solve_body"), ("scikit_fem", "solve_field", "solve_field")],
+)
+def test_each_is_asked_for_what_it_solves(solver: str, task: str, asked: str) -> None:
+    assert records.task_of(solver, task) == asked
+    assert solvers.find(solver, "here", asked).task == asked

@@ -12,14 +12,14 @@ from fem_reference.geometry import skins
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx, pbd
-from fem_reference.studies.hard import choosing, records, running, steps
+from fem_reference.studies.hard import records, repeats, running
 
 CASES = {hard.name: hard for hard in records.read_all()}
-FAST = [name for name in choosing.choices() if name not in ("fenicsx", "scikit_fem")]
+FAST = [name for name in records.choices() if name not in ("fenicsx", "scikit_fem")]
 
 
 def cell(name: str, solver: str, **settings: object) -> Cell:
-    choice = choosing.choices()[solver]
+    choice = records.choices()[solver]
     return running.cell(running.Posed(CASES[name]), SolverChoice(**{"solver": solver, **choice.settings, **settings}))
 
 
@@ -39,7 +39,7 @@ def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
 def test_fibres_that_pull_with_many_shear_moduli_end_alike_whatever_the_steps() -> None:
     found = cell("activation.both_ends_held", "fenicsx")
     assert found.verdict == "ok"
-    assert float(found.sentence.split("steps: 1: ")[1].split(" %")[0]) < steps.SAME
+    assert float(found.sentence.split("steps: 1: ")[1].split(" %")[0]) < repeats.SAME
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_where_inexact_linear_solutions_lead_nowhere_exact_ones_are_tried(monkey
     hard = CASES["squeeze_sliding.4_cells"]
     block = hard.block.model_copy(update={"cells": (3, 3, 3)})
     built = running.Posed(hard.model_copy(update={"block": block})).problem
-    given = hard.choice(choosing.choices()["fenicsx"]).settings
+    given = hard.choice(records.choices()["fenicsx"]).settings
     given |= {"first_step": 2.0, "smallest_step": 2.0, "newton_iterations": 10}
     ends = []
     with fenicsx.shared():
@@ -125,11 +125,11 @@ def test_a_reference_that_stalls_is_inconclusive(monkeypatch) -> None:
     stalled = Outcome("stalled", "the machine was busy")
     hard = CASES["at_rest.millimetres"]
     stand_ins.solve_by(monkeypatch, fenicsx, lambda *_: stalled)
-    found = running.cell(running.Posed(hard), choosing.choices()["fenicsx"])
+    found = running.cell(running.Posed(hard), records.choices()["fenicsx"])
     assert (found.verdict, found.status, found.sentence) == ("inconclusive", "stalled", "stalled: the machine was busy")
 
 
 def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
     hard = CASES["at_rest.millimetres"].model_copy(update={"only": ("pbd",), "because": "it is about PBD"})
-    found = running.cell(running.Posed(hard), choosing.choices()["arap"])
+    found = running.cell(running.Posed(hard), records.choices()["arap"])
     assert (found.verdict, found.sentence) == ("refused", "the case is about pbd only: it is about PBD")

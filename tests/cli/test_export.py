@@ -1,4 +1,4 @@
-"""The reference with its states: taken as it is where it has them, and solved again only where that is asked for."""
+"""Runs for ParaView: the reference with its states, taken as is where it has them, and solved again only if that is asked for."""
 
 from pathlib import Path
 

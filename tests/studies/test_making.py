@@ -1,27 +1,100 @@
-"""``effects = "auto"``: runs are those of the listed effects, and what only tetrahedra show is found out."""
+"""Runs while they are made: by one process at a time, with the error bars kept beside them, and watched for omitted effects."""
 
 import importlib.util
+import logging
+import threading
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import random_scenes
+import shapes
 import small
 from auto_scenes import ACTIVE, STILL, pennate, solved_as
 
-from fem_reference.runs.store import Run
+from fem_reference.assessment import error_bars
+from fem_reference.problems.problem import AtRest
+from fem_reference.runs.key import versions
+from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies import run_folders, watched
+from fem_reference.studies import making
 from fem_reference.studies.execution import Bench
+from fem_reference.studies.making import bars_kept, locked
+from fem_reference.studies.scene_changes import without_states
+
+
+@pytest.mark.slow
+def test_a_run_asked_for_twice_at_a_time_is_made_once(tmp_path, caplog) -> None:
+    caplog.set_level(logging.INFO, logger="fem_reference")
+    scene = casefile.read(small.write(tmp_path / "bar"))
+    made = []
+
+    def ask() -> None:
+        made.append(Bench(scene, tmp_path / "runs").obtain("pbd", scene.candidate[0], "candidate[0]"))
+
+    threads = [threading.Thread(target=ask) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 2
+    assert np.array_equal(made[0].positions, made[1].positions)
+    assert caplog.text.count("solved before") == 1
+
+
+def test_a_folder_that_is_locked_waits_for_its_turn(tmp_path: Path) -> None:
+    said: list[str] = []
+
+    def second() -> None:
+        with locked(tmp_path / "runs" / "one"):
+            said.append("second")
+
+    with locked(tmp_path / "runs" / "one"):
+        thread = threading.Thread(target=second)
+        thread.start()
+        thread.join(0.2)
+        assert thread.is_alive()
+        said.append("first")
+    thread.join()
+    assert said == ["first", "second"]
+    with locked(tmp_path / "runs" / "one"), locked(tmp_path / "runs" / "two"):  # others do not wait
+        assert not (tmp_path / "runs" / "one").exists()
+
+
+@pytest.mark.parametrize(("numpy", "kept"), [(None, True), ("0", False)])
+def test_error_bars_stay_where_the_same_packages_solve_again(numpy: str | None, kept: bool, tmp_path: Path) -> None:
+    made = versions() | ({} if numpy is None else {"numpy": numpy})
+    surface = shapes.sphere(0)
+    folder = tmp_path / "run"
+
+    def make() -> None:
+        identity = {"name": "one", "solver": "test", "frames": (0,), "origin": {"versions": made}}
+        writer = Writer(folder, identity, AtRest(surface))
+        writer.add(Frame(0, surface.points))
+        writer.close(Outcome("converged", ""))
+
+    make()
+    (folder / error_bars.FILE).write_text("bars")
+    with bars_kept(folder):
+        make()
+        assert not (folder / error_bars.FILE).exists()
+    assert (folder / error_bars.FILE).exists() == kept
+
+
+def test_only_a_reference_is_asked_to_keep_no_states() -> None:
+    reference, other = SolverChoice(solver="fenicsx", element="P2/P1"), SolverChoice(solver="pbd", stretch=1.0)
+    assert without_states(reference).settings == {"element": "P2/P1", "store_state": False}
+    assert without_states(other) == other
 
 
 def asked(bench: Bench[MuscleCase]) -> Run:
     """The reference's run, of which a stand-in for the solver has no states to keep."""
-    return bench.obtain("reference", run_folders.without_states(bench.scene.reference), "reference")
+    return bench.obtain("reference", without_states(bench.scene.reference), "reference")
 
 
 def spindle(folder: Path, choice: str, effects: str = ACTIVE) -> MuscleCase:
@@ -95,7 +168,7 @@ def test_a_run_that_was_watched_to_its_end_is_not_watched_again(tmp_path, monkey
     assert len(made) == 1
     assert run.origin["watched"] == bench.watch().names
     assert bench.watch().frames == {}
-    watched.begin(bench.watch(), SimpleNamespace(folder=run.folder, frames=run.numbers[:3]))  # of one that was cut off
+    assert not any(making.seen(bench.watch(), run.folder, run.numbers[:3]))  # of one that was cut off
     assert tuple(bench.watch().frames) == run.numbers[:3]
     assert all(one.stresses.acts == pytest.approx(0, abs=1e-12) for one in bench.watch().frames.values())
 

@@ -1,24 +1,75 @@
-"""The same end whatever the mesh: the reference on a hard case time and again, on meshes that are a little different at random."""
+"""The same end whatever the load steps and the mesh: the reference on a hard case time and again."""
 
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fem_reference.assessment.health import Followed
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
-from fem_reference.runs.store import Outcome
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.studies.hard.records import Hard
-from fem_reference.studies.hard.steps import SameEnd
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers import fenicsx
+from fem_reference.studies.hard.records import Hard, StepCounts
 
+SAME = 0.01  # [%] of the body's size: states that differ by more are different
+_CUTS = 64  # a load step is cut to this part of itself before it is given up
 MOVED = 0.1  # of a cell of a block, by which its points are moved at most
 SIZES = 0.03  # of the size of the tetrahedra of a shipped case, by which it differs at most
 LONGEST = 60.0  # [s] of processor time of a run that is repeated
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
+
+
+class StalledError(Exception):
+    """The machine was too busy to say anything of a run, and why."""
+
+
+@dataclass(frozen=True)
+class SameEnd:
+    """A comparison of runs that should end alike: ``same`` where those that reached the end did; a ``sentence`` on each."""
+
+    same: bool
+    sentence: str
+
+
+def farthest(followed: Followed) -> StepCounts | None:
+    """Load steps to the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+    moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
+    return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
+
+
+def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
+    """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
+    ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
+    for count in steps.counts:
+        step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
+        settings, frames = fenicsx.Settings(**{**choice.settings, **step}), list[Frame]()
+        outcome = fenicsx.solve(replace(built, frames=(built.frames[0], steps.until)), settings, frames.append)
+        check_not_stalled(outcome)
+        if outcome.status == "converged":
+            ends[count] = frames[-1].points
+        else:
+            words.append(f"{count}: {outcome.status}")
+    if not ends:
+        return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
+    standard, size = ends[max(ends)], diagonal(built.surface.points)
+    off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
+    apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
+    listed = ", ".join(apart + words) or "one only"
+    return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
+
+
+def check_not_stalled(outcome: Outcome) -> None:
+    """StalledError where an ``outcome`` says nothing of the run."""
+    if outcome.status == "stalled":
+        raise StalledError(outcome.message)
 
 
 def jittered(hard: Hard, number: int) -> Hard:
@@ -34,7 +85,7 @@ def jittered(hard: Hard, number: int) -> Hard:
     return hard.model_copy(update={"shipped": shipped.model_copy(update={"changes": changed})})
 
 
-def compare(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
+def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
     """Compare ``count`` runs of a case on other meshes with the ``first``: all alike converged or not, and the greatest distance
     over frames, in per cent of the body's size; at points of the same material.
     """
@@ -56,7 +107,7 @@ def compare(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solv
             return SameEnd(True, f"no jitters, of which one takes more than {LONGEST:g} s")
     words = ", ".join(f"{many} {status}" for status, many in ended.most_common())
     if off:
-        words += f", up to frame {min(reached)}" + (f" to {max(reached)}" if min(reached) < max(reached) else "")
+        words += f", up to frame {' to '.join(map(str, sorted({min(reached), max(reached)})))}"
         words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
     statuses = set(ended) - {"refused"}
     alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses

@@ -1,0 +1,142 @@
+"""A run while it is made: alone in its folder, frames stored as they are reached, and watched for effects that its case omits."""
+
+import logging
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from fem_reference.assessment import error_bars
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.io import files
+from fem_reference.problems.estimates import Decision
+from fem_reference.problems.of_case import CaseSetup
+from fem_reference.problems.stresses import Watch
+from fem_reference.runs import cut_off, states, store
+from fem_reference.runs.key import versions
+from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.writer import Writer
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers.common.protocol import AnySolver
+
+log = logging.getLogger(__name__)
+
+
+class StoppedError(Exception):
+    """A run that goes on with other effects, and why."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A run that is wanted: the ``name`` that pages give it, its solver and settings, and the ``folder`` that it is stored in."""
+
+    name: str
+    choice: SolverChoice
+    offer: AnySolver
+    settings: Record
+    folder: Path
+
+    def stored(self, ended: tuple[str, ...]) -> Run | None:
+        """The stored run that ``ended`` so, under the name that it has here; None where there is none, other packages made it, or
+        it lacks states that the settings ask for.
+        """
+        run = store.finished(self.folder, ended)
+        if run is None:
+            return None
+        now, then = versions(), run.origin.get("versions", {})
+        other = [name for name in now if name in then and now[name] != then[name] and name != "python"]
+        if other:
+            log.info("%s: solved before, but with another %s; solving again", self.name, other[0])
+            return None
+        if getattr(self.settings, "store_state", None) and not states.are_kept(self.folder, run.numbers):
+            log.info("%s: solved before without its states; solving again", self.name)
+            return None
+        log.info("%s: solved before, taken from %s", self.name, self.folder)
+        return replace(run, name=self.name)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Make the run in ``folder`` alone: a second process waits, and then finds it made."""
+    files.make_folder(folder.parent)
+    lock = FileLock(folder.parent / f".{folder.name}.lock")
+    try:
+        held = lock.acquire(timeout=0)
+    except Timeout:
+        log.info("%s: another process is making this run; waiting for it", folder)
+        held = lock.acquire()
+    with held:
+        yield
+
+
+@contextmanager
+def bars_kept(folder: Path) -> Iterator[None]:
+    """Keep the error bars beside a run where the same packages solve it again for its states."""
+    path, before = folder / error_bars.FILE, store.finished(folder)
+    same = before is not None and before.origin.get("versions") == versions()
+    bars = path.read_text(encoding="utf-8") if same and path.is_file() else None
+    yield
+    if bars is not None:
+        files.write_text(path, bars)
+
+
+def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple[Decision, ...]]:
+    """The effects that matter at each of the frames ``numbers`` that a ``folder`` stores, as ``watch`` sees them anew."""
+    watch.frames.clear()
+    for number in numbers:
+        yield watch.see(number, *cut_off.places(folder, number))
+
+
+def _stop_for(found: Sequence[Decision]) -> None:
+    """StoppedError where effects were ``found`` to matter."""
+    if found:
+        titles = " and ".join(one.effect.title for one in found)
+        raise StoppedError(f"{titles}, left out, turned out to matter at frame {found[0].turned_out}")
+
+
+def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
+    """Solve, with each frame written as it is reached, and the cost of all; ``watch`` sees each frame, and may stop the run. A run
+    that failed before its first frame has the state at rest.
+    """
+
+    def add(frame: Frame) -> None:
+        writer.add(frame)
+        if watch is not None and frame.surface is not None:
+            _stop_for(watch.see(frame.number, frame.surface, frame.points if len(frame.points) else None))
+
+    if watch is not None:
+        list(seen(watch, writer.folder, writer.frames))  # stored by a process before this one
+    forget_peak_memory()
+    began, solve, go_on = time.process_time(), wanted.offer.solve, wanted.offer.go_on
+    try:
+        sofar = (given, wanted.settings, add)
+        outcome = go_on(*sofar, writer.cut_off) if go_on else solve(*sofar)
+        if watch is not None and outcome.status == "converged":
+            _stop_for(watch.end())
+    except StoppedError as why:
+        outcome = Outcome("stopped", str(why))
+    processor, cost = time.process_time() - began, outcome.cost
+    if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
+        processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
+    used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()}
+    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own says what those used
+    if not writer.frames:
+        rest = given.rest
+        writer.add(Frame(given.frames[0], rest.surface.points, rest.fibres.points if rest.fibres else None))
+    names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
+    writer.close(outcome, **_contact(writer.state), **names)
+
+
+def _contact(state: dict[str, Any]) -> dict[str, str]:
+    """A note where contact was in the equations of a run, by its ``state``."""
+    counts = state["scalars"].get("contact_points")
+    if counts is None:
+        return {}
+    pressed = [number for number, count in zip(state["numbers"], counts, strict=True) if count]
+    return {"contact": f"pressed first at frame {pressed[0]}" if pressed else "nothing was pressed at any frame"}
