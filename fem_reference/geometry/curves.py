@@ -1,8 +1,8 @@
 """Curves from few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
-A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report are
-misprinted: in the second row of the Bezier matrix (3.1) the signs must be -3, 3; and the matrix (3.2) is the uniform spline, not the
-centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
+A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
+are misprinted: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and the matrix (3.2) is that of the uniform spline, not of
+the centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable
@@ -32,18 +32,21 @@ def knots(points: Floats, exponent: float = 1.0) -> Floats:
 
 def constant(points: Floats) -> Curve:
     """The nearest of ``points`` (n, d) by chord length (report 3.1)."""
-    return interp1d(knots(points), points, kind="nearest", axis=0)
+    found: Curve = interp1d(knots(points), points, kind="nearest", axis=0)
+    return found
 
 
 def linear(points: Floats) -> Curve:
     """Straight between ``points`` (n, d) (report 3.1)."""
-    return interp1d(knots(points), points, axis=0)
+    found: Curve = interp1d(knots(points), points, axis=0)
+    return found
 
 
 def bezier(points: Floats) -> Curve:
     """The Bezier curve of degree n - 1 whose control points are ``points`` (n, d); it passes the first and the last (3.1)."""
     knots(points)
-    return BPoly(points[:, None], [0.0, 1.0])
+    found: Curve = BPoly(points[:, None], [0.0, 1.0])
+    return found
 
 
 def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
@@ -56,7 +59,8 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
     slopes = np.diff(points, axis=0) / np.diff(times)[:, None]
     wide = (times[2:] - times[:-2])[:, None]
     inner = slopes[:-1] + slopes[1:] - (points[2:] - points[:-2]) / wide
-    return CubicHermiteSpline(times, points, np.concatenate([slopes[:1] / 2, inner, slopes[-1:] / 2]))
+    found: Curve = CubicHermiteSpline(times, points, np.concatenate([slopes[:1] / 2, inner, slopes[-1:] / 2]))
+    return found
 
 
 def fourier(points: Floats, harmonics: int | None = None) -> Curve:

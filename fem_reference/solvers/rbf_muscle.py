@@ -1,0 +1,200 @@
+"""An implicit muscle of few Gaussians that move with the bones: the goal that the report sets in section 7.1.
+
+The surface at rest is fitted by Gaussians, four numbers each (``geometry.gaussian_surface``). At each frame number
+
+- the centres, and a few points of each attachment that are at their bone, are as rigid as possible among their neighbours (eq. 5.10
+  on a graph of tens of nodes);
+- centres are pushed away from bones that the surface has entered, and vertices that are still inside are moved out;
+- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres grow thin; all radii
+  are scaled together until the enclosed volume is that of rest.
+
+A vertex is carried by the Gaussians that make the surface at it, and put back to the level that it had at rest, so that the fit's
+error stays as it was. Attached vertices are exact.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial import cKDTree
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
+from fem_reference.geometry.gaussian_surface import GaussianSurface, farthest_points, fit
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.solvers.common.frame_loop import carry, follow
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
+from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+
+# Neighbours of a node, and nodes of an attachment.
+_AROUND, _HANDLES = 8, 12
+# Rounds of pushing centres out of bones, and of scaling radii.
+_PUSHES, _SCALINGS = 4, 3
+
+
+class RbfSettings(Record):
+    """``gaussians``: how many, four parameters each. ``iterations``: local and global steps of a frame number. ``volume``: keep the
+    volume by the radii. ``contact``: avoid bones; off where the key is omitted.
+    """
+
+    gaussians: Annotated[int, Field(ge=2), Trade((10, 30, 100))]
+    iterations: Annotated[int, Field(gt=0), Trade((3, 10, 30))] = 10
+    volume: bool = True
+    contact: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Cloud:
+    """Nodes (k, 3) that stay as rigid as possible: first the centres, then the points of attachments, which are given. ``one`` and
+    ``other`` (e,) are the ends of edges; ``factor`` is that of the matrix of the free nodes.
+    """
+
+    nodes: Floats
+    free: int
+    one: Ints
+    other: Ints
+    laplacian: Floats
+    factor: tuple[Floats, bool]
+
+    @staticmethod
+    def of(centres: Floats, given: Floats) -> "_Cloud":
+        nodes, free = np.concatenate([centres, given]), len(centres)
+        _, near = cKDTree(nodes).query(nodes, k=min(_AROUND + 1, len(nodes)))
+        pairs = np.stack([np.repeat(np.arange(len(nodes)), near.shape[1] - 1), near[:, 1:].ravel()])
+        one, other = np.unique(np.concatenate([pairs, pairs[::-1]], axis=1), axis=1)
+        laplacian = np.zeros((len(nodes), len(nodes)))
+        laplacian[one, other] = -1.0
+        np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
+        return _Cloud(nodes, free, one, other, laplacian, cho_factor(laplacian[:free, :free]))
+
+    def gradients(self, now: Floats) -> Floats:
+        """Sums (k, 3, 3) of edge now times edge at rest, around each node."""
+        found = np.zeros((len(self.nodes), 3, 3))
+        before, after = (points[self.one] - points[self.other] for points in (self.nodes, now))
+        np.add.at(found, self.one, after[:, :, None] * before[:, None])
+        return found
+
+    def rotations(self, now: Floats) -> Floats:
+        """The rotation (k, 3, 3) around each node."""
+        u, _, v = np.linalg.svd(self.gradients(now))
+        u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+        return u @ v
+
+    def relax(self, now: Floats, iterations: int) -> Floats:
+        """Nodes (k, 3) after local and global steps from ``now``."""
+        for _ in range(iterations):
+            turn = self.rotations(now)
+            right = np.zeros_like(now)
+            edges = self.nodes[self.one] - self.nodes[self.other]
+            np.add.at(right, self.one, np.einsum("eij,ej->ei", turn[self.one] + turn[self.other], edges) / 2)
+            right = right[: self.free] - self.laplacian[: self.free, self.free :] @ now[self.free :]
+            now = np.concatenate([cho_solve(self.factor, right), now[self.free :]])
+        return now
+
+    def stretch(self, now: Floats, along: Floats) -> Floats:
+        """The stretch (k,) around each node along directions (k, 3) at rest."""
+        spread = self.gradients(self.nodes)
+        small = 1e-3 * np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        gradients = (self.gradients(now) + self.rotations(now) @ small) @ np.linalg.inv(spread + small)
+        return np.asarray(np.linalg.norm(np.einsum("kij,kj->ki", gradients, along), axis=1))
+
+
+class RbfMuscle:
+    """The muscle at one frame after the other."""
+
+    advice = "a slower motion, more iterations, or contact = false, may help"
+
+    def __init__(self, setup: Setup, settings: RbfSettings) -> None:
+        rest, vertices = setup.surface, setup.attached_vertices
+        self.setup, self.settings, self.fitted = setup, settings, fit(rest, settings.gaussians)
+        self.level, _, self.shares = self.fitted.level(rest.points)
+        self.handles = [
+            entry.vertices[farthest_points(rest.points[entry.vertices], _HANDLES)] for entry in setup.attached
+        ]
+        self.cloud = _Cloud.of(self.fitted.centres, rest.points[np.concatenate(self.handles)])
+        away, nearest = cKDTree(rest.points[vertices]).query(rest.points)
+        self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
+        self.along = _along(setup, self.cloud.nodes)
+        self.volume = enclosed_volume(rest.points, rest.triangles)
+        self.points, self.nodes = setup.begin(rest.points), self.cloud.nodes
+        self.checks = surface_checks(rest, vertices)
+        self.cost: dict[str, float] = {"unknowns": 4.0 * settings.gaussians}
+
+    def move(self, number: int) -> None:
+        """Find the muscle at a frame."""
+        count, setup, rest = self.cloud.free, self.setup, self.fitted
+        poses = zip(setup.attached, self.handles, strict=True)
+        given = [apply(entry.bone.pose(number), setup.surface.points[handles]) for entry, handles in poses]
+        nodes = self.cloud.relax(np.concatenate([self.nodes[:count], *given]), self.settings.iterations)
+        points = self._carried(nodes)
+        for _ in range(_PUSHES if self.settings.contact else 0):
+            push = self._pushes(points, number)
+            hit = np.maximum(self.shares.T @ np.any(push, axis=1), 1.0)
+            shift = (self.shares.T @ push) / hit[:, None]
+            points, nodes[:count] = points + self.shares @ shift, nodes[:count] + shift
+        radii = rest.radii / np.sqrt(self.cloud.stretch(nodes, self.along)[:count])
+        self.points, self.nodes = self._settled(GaussianSurface(nodes[:count], radii), points, number), nodes
+
+    def _carried(self, nodes: Floats) -> Floats:
+        """Vertices (n, 3) carried by the Gaussians, each of which moves rigidly."""
+        turns, count = self.cloud.rotations(nodes), self.cloud.free
+        shifts = nodes[:count] - np.einsum("mij,mj->mi", turns[:count], self.fitted.centres)
+        turned = np.einsum("nij,nj->ni", np.tensordot(self.shares, turns[:count], 1), self.setup.surface.points)
+        return np.asarray(turned + self.shares @ shifts)
+
+    def _pushes(self, points: Floats, number: int) -> Floats:
+        """The way (n, 3) [mm] of each vertex out of the bone that it is in."""
+        found, free = np.zeros_like(points), np.flatnonzero(self.setup.free)
+        for bone in self.setup.bones:
+            pose = bone.pose(number)
+            sampled = bone.shape.sample(apply(np.linalg.inv(pose), points[free]))
+            found[free] -= np.minimum(sampled.distance, 0)[:, None] * sampled.gradient @ pose[:3, :3].T
+        return found
+
+    def _settled(self, moved: GaussianSurface, points: Floats, number: int) -> Floats:
+        """Vertices (n, 3) on their levels, attached ones at their bones, out of bones, with the volume of rest."""
+        scale = 1.0
+        for _ in range(_SCALINGS if self.settings.volume else 1):
+            points = GaussianSurface(moved.centres, scale * moved.radii).project(points, self.level)
+            bony = points.copy()
+            carry(bony, self.setup, number)
+            points += self.beside[:, None] * (bony - points)[self.nearest]
+            if self.settings.contact:
+                points += self._pushes(points, number)
+            scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
+        return points
+
+    def trouble(self) -> Trouble | None:
+        """The trouble with the surface; None without."""
+        return first_trouble(self.checks, self.points)
+
+    def frame(self, number: int) -> Frame:
+        """The surface."""
+        return Frame(number, self.points.copy())
+
+    def ending(self) -> Outcome:
+        """Converged, as every state is found by formulas."""
+        return Outcome("converged", f"{self.settings.gaussians} Gaussians, {4 * self.settings.gaussians} parameters")
+
+
+def _along(setup: Setup, nodes: Floats) -> Floats:
+    """Unit vectors (k, 3) at ``nodes`` (k, 3) from the middle of the first attachment to that of the others."""
+    first = setup.surface.points[setup.attached[0].vertices].mean(axis=0)
+    last = setup.surface.points[setup.attached[-1].vertices].mean(axis=0)
+    return np.broadcast_to((last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny), nodes.shape)
+
+
+def solve(setup: Setup, settings: RbfSettings, sink: Sink) -> Outcome:
+    """Find the muscle at every frame number."""
+    if not setup.attached:
+        raise InputError("rbf_muscle", "a muscle without attachments", "attachments whose bones move it")
+    return follow(RbfMuscle(setup, settings), setup, sink)
+
+
+_TABLE = TableRow("Implicit RBF", "rbf_muscle", {"gaussians": 100, "contact": True})
+SOLVES = (MuscleSolver(settings=RbfSettings, solve=solve, example={"gaussians": 10}, table=(_TABLE,)),)
