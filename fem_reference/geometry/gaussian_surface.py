@@ -124,7 +124,8 @@ def _inside(surface: Surface, volume: float) -> Floats:
     """Nodes (k, 3) of a cubic grid along the principal axes that are inside."""
     middle = surface.points.mean(axis=0)
     axes = np.linalg.svd(surface.points - middle, full_matrices=False)[2]
-    axes *= np.sign((((surface.points - middle) @ axes.T) ** 3).sum(axis=0))[:, None]  # towards the longer tail
+    tails = (((surface.points - middle) @ axes.T) ** 3).sum(axis=0)
+    axes[tails < 0] *= -1
     local, step = (surface.points - middle) @ axes.T, float(np.cbrt(volume / _INSIDE))
     ticks = [
         np.arange(low + step / 2, high, step) for low, high in zip(local.min(axis=0), local.max(axis=0), strict=True)
