@@ -30,6 +30,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.frame_loop import carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.pbd_kernels import volume
 
 # Neighbours of a node, and nodes of an attachment.
 _AROUND, _HANDLES = 8, 12
@@ -164,10 +165,18 @@ class RbfMuscle:
             bony = points.copy()
             carry(bony, self.setup, number)
             points += self.beside[:, None] * (bony - points)[self.nearest]
-            if self.settings.contact:
-                points += self._pushes(points, number)
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
+        if self.settings.volume:
+            points += self._missing_volume(points)
+        if self.settings.contact:
+            points += self._pushes(points, number)
         return points
+
+    def _missing_volume(self, points: Floats) -> Floats:
+        """The displacement (n, 3) of free vertices along the gradient of the volume that gives back what radii left over."""
+        six, gradient = volume(points, self.setup.surface.triangles)
+        gradient[self.setup.attached_vertices] = 0
+        return gradient * (6 * self.volume - six) / float((gradient**2).sum())
 
     def trouble(self) -> Trouble | None:
         """The trouble with the surface; None without."""
