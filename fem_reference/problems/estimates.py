@@ -19,7 +19,7 @@ from fem_reference.effects import (
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.problems import fibre_field
+from fem_reference.problems.anatomy import lean
 from fem_reference.problems.guess import (
     Guess,
     axis_of,
@@ -146,7 +146,7 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
         tension=_tension(case),
         fixed=len(rest.attached),
         sag=sag(rest, frames, travel),
-        lean=fibre_field.lean(case, axis_of(rest)),
+        lean=lean(case, axis_of(rest)),
         travel=travel,
         stretch=(taut * low, taut * high),
         interval=case.frames.interval,
