@@ -188,8 +188,8 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
 
 def _omission(one: Made, left_out: tuple[str, ...], **measured: dict[str, float]) -> Omission:
     """The end of a run and its cost, beside what was ``measured`` on it."""
-    end = one.outcome
-    return Omission(left_out, end.status, end.message, costs=dict(end.cost), instead=one.trial.changed, **measured)
+    costs = dict(one.run.outcome.cost) if one.run else {}
+    return Omission(left_out, *one.ended, costs=costs, instead=one.trial.changed, **measured)
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
