@@ -186,9 +186,9 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 def _solved(bench: Bench[MuscleCase], case: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
-    other = Bench(case, bench.store, bench.ranks)
     try:
-        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
+        choice = without_states(case.reference)
+        run = Bench(case, bench.store, bench.ranks).obtain(f"reference, {name}", choice, "reference")
     except InputError as error:
         got = f"a scene that cannot be set up ({error})"
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
