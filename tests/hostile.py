@@ -24,7 +24,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, check_closed, check_finite
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
-from fem_reference.problems import attachments, muscle, scalar
+from fem_reference.problems import anatomy, muscle, scalar
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import Setup
 from fem_reference.runs import results, states, store
@@ -421,9 +421,9 @@ def _make_tables(folder: Path) -> None:
 
 def read_tables(folder: Path) -> None:
     """Vertices of an attachment, and the landmarks around one, laid on a bone."""
-    attachments._listed(folder / "ends.csv", SimpleNamespace(value=2), len(BALL.points))  # type: ignore[arg-type]
+    anatomy._listed(folder / "ends.csv", SimpleNamespace(value=2), len(BALL.points))  # type: ignore[arg-type]
     outline = Outline(file="landmarks.csv", unit="mm", clouds=("a",), reach="5 mm")  # type: ignore[arg-type]
-    attachments.draped(attachments._patches(folder / "landmarks.csv", outline, "case.toml"), BALL)
+    anatomy.draped(anatomy._patches(folder / "landmarks.csv", outline, "case.toml"), BALL)
 
 
 def _meshes() -> dict[str, Kind]:

@@ -24,6 +24,7 @@ from fem_reference.io.formats.vtk import DataBlock, Tree
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
+from fem_reference.runs.contents import frame_file
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
@@ -45,7 +46,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
         frames = _Frames(comparison)
         entries = []
         for i, number in enumerate(comparison.reference.numbers):
-            name = f"frames/frame_{number:04d}.vtm"
+            name = f"frames/{frame_file(number, '.vtm')}"
             (part / "frames").mkdir(exist_ok=True)
             files.write_blocks(part / name, frames.blocks(i))
             entries.append((number if case.frames.interval is None else number * case.frames.interval, name))

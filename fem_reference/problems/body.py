@@ -6,6 +6,7 @@ Independent of any solver.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -49,30 +50,23 @@ def is_stabilised(element: str) -> bool:
 
 def boundary_facets(mesh: "Cells") -> Ints:
     """The facets that belong to only one cell, as their corners (f, 3 or 4) in ascending order."""
-    if mesh.kind == "tetrahedron":
-        sides = [np.delete(np.arange(4), i) for i in range(4)]
-    else:
-        corners = reference_nodes(mesh.kind, 1)
-        sides = [np.flatnonzero(corners[:, axis] == end) for axis in range(3) for end in (0, 1)]
-    facets = np.sort(mesh.cells[:, np.stack(sides)].reshape(-1, len(sides[0])), axis=1)
+    sides = facet_corners(mesh.kind)
+    facets = np.sort(mesh.cells[:, np.array(sides)].reshape(-1, len(sides[0])), axis=1)
     unique, counts = np.unique(facets, axis=0, return_counts=True)
     return np.asarray(unique[counts == 1])
 
 
+def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
+    """The corners of each facet of a cell, in the order of the cell's corners."""
+    if kind == "tetrahedron":
+        return list(combinations(range(4), 3))
+    corners = reference_nodes(kind, 1)
+    return [tuple(np.flatnonzero(corners[:, axis] == end).tolist()) for axis in range(3) for end in (0, 1)]
+
+
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError unless an element suits cells and effects.
-
-    Parameters
-    ----------
-    element
-        A key of ``ELEMENTS``, such as ``"P2/P1"``.
-    kind, degree
-            Those of the cells; the displacement must be of this degree or above.
-    effects
-            The element must have a pressure if and only if an effect needs it.
-    place
-            The key that the error names.
-
+    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
+    displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs it.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -109,21 +103,9 @@ def reference_nodes(kind: Kind, degree: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells between points: the mesh of a body.
-
-    Parameters
-    ----------
-    points
-        Positions (n, 3) [mm] at rest.
-    cells
-        Indices (m, k) of the points of each cell, in the order of :func:`reference_nodes`.
-    kind
-        ``"tetrahedron"`` or ``"hexahedron"``.
-    degree
-        1: straight cells; 2: curved ones.
-    facets
-        By name of a region of the surface, the corners (f, 3 or 4) of its facets.
-
+    """The mesh of a body: ``points`` (n, 3) [mm] at rest, and ``cells`` (m, k), the indices of the points of each cell in the
+    order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved ones. ``facets``: by name of a region of the surface,
+    the corners (f, 3 or 4) of its facets.
     """
 
     points: Floats
@@ -135,21 +117,10 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A prescribed displacement of a part of the surface.
-
-    Parameters
-    ----------
-    name
-            Under which its reaction force is reported.
-    on
-        A region of ``Cells.facets``, or a skin.
-    components
-            The prescribed axes: 0, 1, 2 for x, y, z.
-    path
-            A picklable callable of rest points (n, 3) [mm] and a frame number; returns displacements (n, 3) [mm].
-    stiffness
-            [MPa/mm] of springs over the area that pull towards the path; None: exact. A skin has springs only.
-
+    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
+    reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
+    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm] of springs over the
+    area that pull towards the path; None: exact. A skin has springs only.
     """
 
     name: str
@@ -173,6 +144,11 @@ class Prescribed:
         if found.shape != points.shape:
             raise InputError(place, f"displacements {found.shape} of points {points.shape}", want)
         return np.asarray(np.where(np.isin(np.arange(3), self.components), found, 0.0))
+
+    def moving(self, points: Floats) -> Moving:
+        """The motion of ``points`` (n, 3) [mm] by the path."""
+        name, known = f'prescribed "{self.name}"', turning(self.path, points)
+        return Moving(name, lambda frame: points + self.displacements(points, frame), known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,14 +202,7 @@ class Body:
         """Frame numbers at which a load step ends, so that none skips over motion within it; InputError where a path cannot be
         followed.
         """
-        things = [_moving(entry, some(self.points_on(entry.on))) for entry in self.prescribed]
+        things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)
         return stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
-
-
-def _moving(entry: Prescribed, points: Floats) -> Moving:
-    def at(frame: float) -> Floats:
-        return points + entry.displacements(points, frame)
-
-    return Moving(f'prescribed "{entry.name}"', at, turning(entry.path, points))

@@ -84,19 +84,13 @@ def check_frames(frames: object, place: str) -> None:
 
 def _is_number(value: Any) -> bool:
     """True of a finite number that is not a bool."""
-    if not isinstance(value, int | float | np.integer | np.floating) or _is_truth(value):
-        return False
-    number: Any = value  # of any type and size
-    return bool(abs(number) <= _FARTHEST)
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    return number and bool(abs(value) <= _FARTHEST)
 
 
 def _is_integer(value: Any) -> bool:
     """True of an integer that is not a bool."""
-    return isinstance(value, int | np.integer) and not _is_truth(value)
-
-
-def _is_truth(value: Any) -> bool:
-    return value is True or value is False
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def _check_many(place: str, given: Any, kind: type, want: str) -> None:
@@ -135,21 +129,20 @@ def _check_cells(mesh: Any) -> None:
     if not (np.abs(points) <= _FARTHEST).all():
         raise InputError("mesh.points", "a point that is not finite, or too far away", f"up to {_FARTHEST:g} mm away")
     nodes = len(reference_nodes(mesh.kind, mesh.degree))
-    _check_indices("mesh.cells", mesh.cells, (nodes,), len(points))
+    _check_indices("mesh.cells", mesh.cells, nodes, len(points))
     if not len(mesh.cells):
         raise InputError("mesh.cells", "none", "at least one")
     if not isinstance(mesh.facets, dict):
         raise InputError("mesh.facets", said(mesh.facets), "a dictionary of arrays by region")
     for name, facets in mesh.facets.items():
-        _check_indices(f"mesh.facets[{name!r}]", facets, (3,) if mesh.kind == "tetrahedron" else (4,), len(points))
+        _check_indices(f"mesh.facets[{name!r}]", facets, 3 if mesh.kind == "tetrahedron" else 4, len(points))
     _check_volumes(mesh)
 
 
-def _check_indices(place: str, given: Any, widths: tuple[int, ...], count: int) -> None:
-    if not isinstance(given, np.ndarray) or given.dtype.kind not in "iu" or given.ndim != 2:
-        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
-    if given.shape[1] not in widths:
-        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
+def _check_indices(place: str, given: Any, width: int, count: int) -> None:
+    integers = isinstance(given, np.ndarray) and given.dtype.kind in "iu"
+    if not integers or given.ndim != 2 or given.shape[1] != width:
+        raise InputError(place, said(given), f"an array of integers (m, {width})")
     if given.size and not (given.min() >= 0 and given.max() < count):
         raise InputError(place, f"index {int(given.min())} to {int(given.max())}", f"indices from 0 to {count - 1}")
 
@@ -173,20 +166,17 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
             raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
         if names.count(entry.name) > 1:
             raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
-        _check_components(f"{place}.components", entry.components)
+        axes = isinstance(entry.components, tuple | list) and len(entry.components) > 0
+        axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in entry.components)
+        if not axes or len(set(entry.components)) < len(entry.components):
+            want = "axes among 0, 1, 2 for x, y, z, each once"
+            raise InputError(f"{place}.components", said(entry.components), want)
         if not callable(entry.path):
             raise InputError(f"{place}.path", said(entry.path), "a function of points and a frame number")
         if entry.stiffness is None and not isinstance(entry.on, str):
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
             raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
-
-
-def _check_components(place: str, components: Any) -> None:
-    axes = isinstance(components, tuple | list) and len(components) > 0
-    axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in components)
-    if not axes or len(set(components)) < len(components):
-        raise InputError(place, said(components), "axes among 0, 1, 2 for x, y, z, each once")
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
@@ -228,14 +218,15 @@ def _check_needs(body: Body) -> None:
 
 def check_agreement(body: Body) -> None:
     """Raise InputError where two regions prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed.
+    followed. They are compared at all frames, all stops, and the middles between them.
     """
-    looked_at = _looked_at(body)
+    ends = np.unique([*body.frames, *body.stops])
+    sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]
     for one, other in combinations(exact, 2):
         common = sorted(set(one.components) & set(other.components))
         places = _shared(body.mesh, str(one.on), str(other.on)) if common else np.zeros((0, 3))
-        for frame in looked_at if len(places) else ():
+        for frame in sampled if len(places) else ():
             found = [entry.displacements(places, frame)[:, common] for entry in (one, other)]
             off = np.abs(found[0] - found[1]).max(axis=1)
             if not off.max() <= SAME * (body.size + np.abs(found).max()):
@@ -249,33 +240,22 @@ def _check_start(body: Body) -> None:
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
-            place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
-            raise InputError(
-                place, f"displacements up to {off:.4g} mm", "none at the first frame: the body begins at rest"
+            place, got = (
+                f'prescribed "{entry.name}": path at frame {body.frames[0]:g}',
+                f"displacements up to {off:.4g} mm",
             )
-
-
-def _looked_at(body: Body) -> Floats:
-    """The sampled frames: all frames, all stops, and the middles between them."""
-    ends = np.unique([*body.frames, *body.stops])
-    return np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+            raise InputError(place, got, "none at the first frame: the body begins at rest")
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:
     """Corners that two regions share and the middles of edges (n, 3) [mm]."""
+    count = len(mesh.points)
+
+    def edges(name: str) -> Ints:
+        facets = np.sort(mesh.facets[name], axis=1)
+        pairs = facets[:, list(combinations(range(facets.shape[1]), 2))]
+        return np.asarray(pairs[..., 0] * count + pairs[..., 1])
+
     corners = np.intersect1d(mesh.facets[one], mesh.facets[other])
-    if not len(corners):
-        return np.zeros((0, 3))
-    edges, known = (_edges(mesh.facets[name], corners) for name in (one, other))
-    both = sorted(edges & known)
-    middles = [mesh.points[list(edge)].mean(axis=0) for edge in both]
-    return np.concatenate([mesh.points[corners], np.reshape(middles, (-1, 3))])
-
-
-def _edges(facets: Ints, corners: Ints) -> set[tuple[int, ...]]:
-    """The pairs of ``corners`` that are in one of ``facets``."""
-    some = np.sort(facets[np.isin(facets, corners).sum(axis=1) > 1], axis=1)
-    pairs = combinations(range(facets.shape[1]), 2)
-    found = {edge for i, j in pairs for edge in map(tuple, some[:, [i, j]].tolist())}
-    known = set(corners.tolist())
-    return {edge for edge in found if known.issuperset(edge)}
+    both = np.divmod(np.intersect1d(edges(one), edges(other)), count)
+    return np.concatenate([mesh.points[corners], mesh.points[np.stack(both, axis=1)].mean(axis=1)])

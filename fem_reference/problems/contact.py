@@ -18,6 +18,8 @@ _LOST = 0.5
 # The least half thickness of a bone, in spacings of contact points: between four of them, 0.71 from each, a thinner one
 # would pass.
 _THINNEST = 0.75
+# Where the overlap at rest reaches down to this share of a bone's half thickness, no direction leads out.
+_MIDDLE = 0.95
 
 log = logging.getLogger(__name__)
 
@@ -65,22 +67,8 @@ class ContactLaw:
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap to a bone on straight paths, sampled at strides as long as the gap safely allows.
-
-    Parameters
-    ----------
-    bone
-        The body whose distance is sampled, in its rest frame.
-    starts, paths
-            The starts of the paths and their displacements, (n, 3) each [mm].
-    least
-        The shortest stride [mm].
-
-    Returns
-    -------
-    array (n,)
-        Gaps [mm], negative inside.
-
+    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
+    ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)
@@ -94,6 +82,16 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest
+
+
+def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
+    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError where a point is in its middle."""
+    nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
+    if nearest < -_MIDDLE * half:
+        got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
+        want = f"less: its middle is {half:.3g} mm deep, and from there no side is nearer"
+        raise InputError(f'bone "{name}"', got, want)
+    return nearest
 
 
 def check_outside(bones: Mapping[str, Surface], muscle: Surface) -> None:

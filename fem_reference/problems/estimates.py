@@ -19,7 +19,7 @@ from fem_reference.effects import (
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.problems import fibre_field
+from fem_reference.problems.anatomy import lean
 from fem_reference.problems.guess import (
     Guess,
     axis_of,
@@ -129,7 +129,8 @@ def _chosen(rest: Setup) -> Ints:
 
 def estimates(case: MuscleCase, rest: Setup) -> Estimates:
     """Estimates that effects need of a case, from a guessed path of the surface; each point with the bones nearest to it."""
-    frames, chosen = _sampled(case.numbers), _chosen(rest)
+    instants = np.unique(np.linspace(0, len(case.numbers) - 1, _FRAMES).round().astype(int))
+    frames, chosen = [case.numbers[i] for i in instants], _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
     guess, felt = Guess.of(points, rest), Guess.of(places, rest)
     moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
@@ -145,7 +146,7 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
         tension=_tension(case),
         fixed=len(rest.attached),
         sag=sag(rest, frames, travel),
-        lean=fibre_field.lean(case, axis_of(rest)),
+        lean=lean(case, axis_of(rest)),
         travel=travel,
         stretch=(taut * low, taut * high),
         interval=case.frames.interval,
@@ -160,10 +161,6 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
     )
 
 
-def _sampled(numbers: tuple[int, ...]) -> list[int]:
-    return [numbers[i] for i in np.unique(np.linspace(0, len(numbers) - 1, _FRAMES).round().astype(int))]
-
-
 def _instants(case: MuscleCase) -> tuple[float, ...]:
     """All frame numbers, and the knots of ramps between them."""
     knots = [knot.frame for effect in case.effects if isinstance(effect, Ramped) for knot in effect.ramp]
@@ -173,10 +170,9 @@ def _instants(case: MuscleCase) -> tuple[float, ...]:
 
 def _shear(case: MuscleCase) -> float:
     """The shear modulus at rest [MPa] of the stored energies, without fibres."""
-    laws = [
-        (one, 1.0) for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)
-    ]
-    isotropic = [(law, amount) for law, amount in laws if not law.needs]
+    stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
+    laws = [(one, 1.0) for one in stored]
+    isotropic = [(one, 1.0) for one in stored if not one.needs]
     small = 1e-3
     sheared = State(F=((1.0, small, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), pressure=0.0, fibre=(0.0, 0.0, 1.0))
     return 2 * float(total_energy(isotropic or laws, sheared)) / small**2 or np.finfo(float).tiny
@@ -185,15 +181,16 @@ def _shear(case: MuscleCase) -> float:
 def _tension(case: MuscleCase) -> float:
     """The stress of all fibres at their rest length [MPa], the mean over the frames."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
-    amounts = [np.mean([one.amount(number) for number in case.numbers]) for one in pulling]
-    return float(sum(amount * fibre_tension(one, 1.0) for one, amount in zip(pulling, amounts, strict=True)))
+    return sum(
+        float(np.mean([one.amount(frame) for frame in case.numbers])) * fibre_tension(one, 1.0) for one in pulling
+    )
 
 
 def _taut(case: MuscleCase) -> float:
     """The greatest stretch of fibres at rest, over the frames."""
-    rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(case)
-    found = [elastic_state([(one, one.amount(number)) for one in case.effects], rest).F[0][0] for number in amounts]
-    return float(max(found))
+    rest = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0))
+    acting = ([(one, one.amount(frame)) for one in case.effects] for frame in _instants(case))
+    return float(max(elastic_state(some, rest).F[0][0] for some in acting))
 
 
 def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
@@ -217,20 +214,14 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     if len(rest.attached) < 2:
         return 1.0, 1.0
     triangles, axis = rest.surface.triangles, axis_of(rest)
-    edges = edge_vectors(rest.surface.points[triangles])
-    parts = np.linalg.pinv(edges) @ axis
-    along = np.linalg.norm(_combined(edges, parts), axis=1)
-    areas = triangle_areas(rest.surface.points, triangles)
-    some = along > _ALONG
-    moved = _combined(edge_vectors(positions[triangles[some]]), parts[some])
-    found = np.linalg.norm(moved, axis=1) / along[some]
-    low, high = np.quantile(found, (0.01, 0.99), weights=areas[some], method="inverted_cdf")
+    parts = np.linalg.pinv(edge_vectors(rest.surface.points[triangles])) @ axis
+    along, moved = (
+        np.linalg.norm(np.einsum("tij,tj->ti", edge_vectors(points[triangles]), parts), axis=1)
+        for points in (rest.surface.points, positions)
+    )
+    some, areas = along > _ALONG, triangle_areas(rest.surface.points, triangles)
+    low, high = np.quantile(moved[some] / along[some], (0.01, 0.99), weights=areas[some], method="inverted_cdf")
     return float(low), float(high)
-
-
-def _combined(edges: Floats, parts: Floats) -> Floats:
-    """The sums (t, 3) of ``edges`` (t, 3, 2) by their ``parts`` (t, 2)."""
-    return np.asarray(np.einsum("tij,tj->ti", edges, parts))
 
 
 def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:

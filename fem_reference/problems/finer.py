@@ -10,8 +10,7 @@ from fem_reference.geometry.embedding import barycentric
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems.body import Body, Cells, Kind, reference_nodes
-from fem_reference.problems.shapes import facet_corners
+from fem_reference.problems.body import Body, Cells, Kind, facet_corners, reference_nodes
 
 # The shares of a cell's corners in the nodes of its parts are multiples of one over this.
 _SHARES = 64
@@ -76,10 +75,7 @@ def _parts(kind: Kind) -> Floats:
 
 def _linear(kind: Kind, places: Floats) -> Floats:
     """The share (..., c) of each corner at places (..., 3) of the reference cell."""
-    if kind == "tetrahedron":
-        return np.asarray(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
-    corners, beside = reference_nodes(kind, 1), places[..., None, :]
-    return np.asarray(np.where(corners > 0, beside, 1 - beside).prod(axis=-1))
+    return _shape(kind, 1, places.reshape(-1, 3)).reshape(*places.shape[:-1], -1)
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
@@ -87,11 +83,8 @@ def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
     cell.
     """
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
-
-    def monomials(points: Floats) -> Floats:
-        return np.asarray((points[:, None, :] ** powers).prod(axis=2))
-
-    return np.asarray(np.linalg.solve(monomials(reference_nodes(kind, degree)).T, monomials(places).T).T)
+    nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
+    return np.asarray(np.linalg.solve(nodes.T, points.T).T)
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:

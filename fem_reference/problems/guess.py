@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
+from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.setup import Bone, Setup
@@ -39,11 +39,6 @@ class Guess:
         parts = zip(self.bones, self.weights.T, strict=True)
         return np.sum([share[:, None] * apply(bone.pose(frame), self.points) for bone, share in parts], axis=0)
 
-    def some(self, count: int) -> "Guess":
-        """The guess for a sample of about ``count`` points."""
-        every = slice(None, None, max(1, len(self.points) // count))
-        return replace(self, points=self.points[every], weights=self.weights[every])
-
 
 def distance(bone: Bone, points: Floats) -> Floats:
     """The signed distance (n,) [mm] of ``points`` to a bone at rest."""
@@ -54,16 +49,15 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
     """The greatest speed, speed sideways of an ``axis`` (3,), jump of velocity and acceleration of a guess, as root mean squares
     over its points, by frame numbers. The velocity jumps where it changes more than before and after.
     """
-    guess, at = guess.some(100), np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
+    some = slice(None, None, max(1, len(guess.points) // 100))
+    guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
+    at = np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
     velocity = np.diff(np.stack([guess.at(frame) for frame in at]), axis=0) / (at[1] - at[0])
-    first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # starts from rest
-    change = rms(np.diff(first, axis=0))
-    typical = float(np.median(change))
-    jumps = change[change > 5 * typical + 1e-12]
-    smooth = change[change <= 5 * typical + 1e-12]
+    change = rms(np.diff(velocity, axis=0, prepend=0.0))  # from rest
+    sudden = change > 5 * np.median(change) + 1e-12
+    jump, smooth = (float(change[some].max(initial=0.0)) for some in (sudden, ~sudden))
     sideways = velocity - (velocity @ axis)[..., None] * axis
-    speeds = (float(rms(one).max()) for one in (velocity, sideways))
-    return *speeds, float(jumps.max(initial=0.0)), float(smooth.max(initial=0.0)) / (at[1] - at[0])
+    return float(rms(velocity).max()), float(rms(sideways).max()), jump, smooth / (at[1] - at[0])
 
 
 def strain(points: Floats, moved: Floats) -> float:
@@ -81,20 +75,18 @@ def rms(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1)))
 
 
-def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
-    """The middle of each attachment, at rest or at a frame."""
-    middles = [rest.surface.points[entry.vertices].mean(axis=0, keepdims=True) for entry in rest.attached]
-    if frame is None:
-        return [middle[0] for middle in middles]
-    return [apply(entry.bone.pose(frame), middle)[0] for entry, middle in zip(rest.attached, middles, strict=True)]
+def centres(rest: Setup) -> list[Floats]:
+    """The middle (3,) [mm] of each attachment at rest."""
+    return [rest.surface.points[entry.vertices].mean(axis=0) for entry in rest.attached]
 
 
 def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
     """The distance (f,) [mm] between the middles of the first and the last attachment, by frame; empty without two."""
     if len(rest.attached) < 2:
         return np.zeros(0)
-    ends = [centres(rest, number) for number in numbers]
-    return np.array([float(np.linalg.norm(middles[0] - middles[-1])) for middles in ends])
+    middles = centres(rest)
+    first, last = ([apply(rest.attached[i].bone.pose(number), middles[i]) for number in numbers] for i in (0, -1))
+    return np.asarray(np.linalg.norm(np.subtract(first, last), axis=1))
 
 
 def described_motion(rest: Setup) -> str:
@@ -146,7 +138,5 @@ def length_of(rest: Setup) -> float:
 
 def thickness_of(rest: Setup) -> float:
     """The thickness [mm] of a plate of its volume and area."""
-    surface = rest.surface
-    return (
-        2 * enclosed_volume(surface.points, surface.triangles) / vertex_areas(surface.points, surface.triangles).sum()
-    )
+    points, triangles = rest.surface.points, rest.surface.triangles
+    return 2 * enclosed_volume(points, triangles) / float(triangle_areas(points, triangles).sum())

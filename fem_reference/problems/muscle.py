@@ -1,4 +1,4 @@
-"""Muscles filled with tetrahedra and fibres, with their effects."""
+"""Muscles filled with tetrahedra and fibres, with their effects, and as finite element bodies attached to bones."""
 
 import time
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
@@ -17,9 +17,11 @@ from fem_reference.foundations.mesh import (
     Polylines,
     Surface,
     TetMesh,
+    boundary,
     check_closed,
     check_finite,
     fingerprint,
+    place_of,
     tet_qualities,
     tet_volumes,
     triangle_areas,
@@ -39,15 +41,27 @@ from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
-from fem_reference.problems import fibre_field
-from fem_reference.problems.attachments import facets_under, pick
-from fem_reference.problems.body import Body
-from fem_reference.problems.contact import check_exempt, check_outside, check_thickness
-from fem_reference.problems.muscle_body import body_of
+from fem_reference.problems.anatomy import facets_under, fibres_of, pick
+from fem_reference.problems.body import Body, Cells, Prescribed
+from fem_reference.problems.checks import check_agreement
+from fem_reference.problems.contact import (
+    ContactBone,
+    ContactLaw,
+    check_exempt,
+    check_outside,
+    check_thickness,
+    nearest_at_rest,
+)
+from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes.bones import CaseBone
 from fem_reference.scenes.muscle import MuscleCase
+
+# Frame numbers before the first over which an overlap at rest is removed.
+RELAXING = 10
+# The greatest ratio of a cell's length to its thickness: stiffnesses differ by its square, and 16 digits do not hold both.
+_THINNEST = 1e6
 
 
 def kept_meshes() -> Path | None:
@@ -89,8 +103,11 @@ class MuscleProblem(Setup):
 
     @cached_property
     def body(self) -> Body:
-        """The finite element body of the muscle; InputError as in :func:`body_of`."""
-        return body_of(self, self.mesh, self.effects, self.fibre, self.skin, self.attached_skins)
+        """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by springs at
+        ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where two bones prescribe
+        different motions, or one moves in a way that cannot be followed.
+        """
+        return _body_of(self)
 
     @property
     def contact(self) -> ContactEffect | None:
@@ -126,14 +143,10 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibre_field.of(case, rest.surface, partial(_filled, case, rest))
+    fibres, fibre = fibres_of(case, rest.surface, partial(_filled, case, rest))
     apart, asked = spacing(rest.surface), (*case.effects, *(one.effect for one in case.decisions))
     return MuscleProblem(
-        rest.surface,
-        rest.bones,
-        rest.attached,
-        rest.frames,
-        rest.interval,
+        *(rest.surface, rest.bones, rest.attached, rest.frames, rest.interval),
         mesh=mesh,
         effects=case.effects,
         fibres=fibres,
@@ -155,18 +168,15 @@ def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """The distance grid of each bone from a file: its spacing, root mean square and greatest error [mm]; InputError where the
-    bones and the surface do not allow contact.
-    """
+    """Spacing and errors [mm] of bones' distance grids; InputError where the bones and the surface do not allow contact."""
     pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
     check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
     check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
     check_exempt(rest.exempt, join(case.place, "attachment"))
-    grids = {bone.name: bone.shape for bone in rest.bones}
     return {
-        f"{name}_distance_{key}_mm": getattr(grid, key)
-        for name, grid in grids.items()
-        if isinstance(grid, Grid)
+        f"{bone.name}_distance_{key}_mm": getattr(bone.shape, key)
+        for bone in rest.bones
+        if isinstance(bone.shape, Grid)
         for key in ("spacing", "mean_error", "error")
     }
 
@@ -207,9 +217,8 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
         if len(vertices) == 0:
             raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
         if taken[vertices].any():
-            raise InputError(
-                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment has", "each vertex once"
-            )
+            got = f"vertex {vertices[taken[vertices]][0]}, which another attachment has"
+            raise InputError(place, got, "each vertex once")
         taken[vertices] = True
         attached.append(AttachedVertices(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
     return tuple(attached)
@@ -222,8 +231,8 @@ def solid(bone: CaseBone) -> Obstacle | None:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Mesher, size and quality of the mesh; and for each attachment the attached area on the surface and on the tets, and the
-    number of its vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
+    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the number of its
+    vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
@@ -243,3 +252,49 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
         facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
         facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
     return facts
+
+
+def _body_of(problem: MuscleProblem) -> Body:
+    mesh, first = problem.mesh, problem.frames[0]
+    _check_cells(mesh)
+    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
+    outer, _ = boundary(mesh.tets)
+    taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
+    free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
+    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+    prescribed = []
+    for entry in problem.attached:
+        name, path = entry.attachment, Follows(From(first, entry.bone.pose))
+        prescribed.append(Prescribed(name, problem.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
+    acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
+    body = Body(cells, acting, tuple(prescribed), problem.frames, problem.fibre, interval=problem.interval)
+    body = replace(body, start=problem.start)
+    if problem.contact is not None:
+        assert problem.skin is not None  # built with the effect
+        body = _among_bones(body, problem.bones, problem.skin, problem.contact)
+    check_agreement(body)
+    return body
+
+
+def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
+    """The body with its bones in contact; where they overlap it at rest, it is relaxed before the first frame."""
+    pressing = [bone for bone in bones if effect.is_by(bone.name)]
+    first, points = body.frames[0], skin.points
+    nearest = min((nearest_at_rest(bone.name, bone.shape, points) for bone in pressing), default=np.inf)
+    before = first - RELAXING if nearest < effect.smoothing else None
+    law = ContactLaw(skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
+    frames = body.frames if before is None else (before, *body.frames)
+    posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
+    return replace(body, frames=frames, contact=law, bones=posed)
+
+
+def _check_cells(mesh: TetMesh) -> None:
+    """Raise InputError where a cell is too thin for double precision."""
+    corners = mesh.points[mesh.tets]
+    longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
+    ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))
+    worst = int(np.argmax(ratios))
+    if not ratios[worst] < _THINNEST:
+        place = f"cell {worst} at {place_of(corners[worst].mean(axis=0))}"
+        want = f"less than {_THINNEST:g}, for double precision"
+        raise InputError(place, f"{ratios[worst]:.1e} times as long as thick", want)

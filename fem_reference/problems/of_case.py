@@ -1,20 +1,28 @@
-"""Case -> set-up and problem, of a muscle or a scalar field."""
+"""Case -> set-up and problem, of a muscle or a scalar field, and their contents in words and numbers."""
 
 import logging
 from collections.abc import Callable
-from typing import Protocol, overload
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.markup import exact
+from fem_reference.foundations.mesh import enclosed_volume
+from fem_reference.foundations.motion import RigidMotion, Translation
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.exemption import Exemption
-from fem_reference.problems import contents, muscle, scalar
+from fem_reference.geometry.sectors import attached_area, attached_shares
+from fem_reference.problems import muscle, scalar
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.problem import Meshed, Problem
+from fem_reference.problems.problem import Problem
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.problems.setup import Bone, Setup
-from fem_reference.problems.watch import Watch
+from fem_reference.problems.stresses import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -46,12 +54,23 @@ class CaseSetup(Problem, Protocol):
         """The scalar field, None for a muscle."""
 
 
-class CaseProblem(CaseSetup, Meshed, Protocol):
+class CaseProblem(CaseSetup, Protocol):
     """The problem of a case as a solver receives it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
+
+    @property
+    def effects(self) -> tuple[Record, ...]:
+        """The effects that act."""
+
+    @property
+    def mesh_facts(self) -> dict[str, float] | dict[str, float | str]:
+        """Size and quality of its mesh, by name."""
 
     @property
     def muscle(self) -> MuscleProblem | None:
         """The muscle, None for a scalar field."""
+
+    def write_meshes(self, folder: Path, /) -> None:
+        """Write the mesh of the solution into ``folder``, for ParaView."""
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
@@ -68,9 +87,68 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
 def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
     """Facts on the contents of a case, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
-        return contents.of_muscle(setup, case)
+        return _facts_of_muscle(setup, case)
     assert isinstance(setup, FieldProblem)  # there are no other types
-    return contents.of_field(setup, case)
+    mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
+    return {
+        "domain": f"{len(mesh.cells)} cells, {len(mesh.points)} vertices, size {mesh.sizes.sum():.6g}",
+        "element": f"P{setup.order}, {len(setup.fixed)} nodes, {fixed} fixed",
+        "form": f"{setup.form}, mesh Peclet number up to {setup.peclet:.3g}",
+        "effects": {
+            title: {name: str(value) for name, value in effect.model_dump().items()}
+            for title, effect in case.acting.items()
+        },
+    }
+
+
+def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
+    """The muscle, its bones, attachments, effects and frames."""
+    surface, frames = setup.surface, case.frames
+    return {
+        "muscle": {
+            "triangles": len(surface.triangles),
+            "volume_mm3": enclosed_volume(surface.points, surface.triangles),
+            "tet_size_mm": case.muscle.tet_size,
+            "refinements": case.muscle.refinements,
+            "mesher": case.muscle.mesher,
+        },
+        "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
+        "attachments": {
+            one.attachment: f"{len(one.vertices)} vertices, "
+            f"{attached_area(surface, attached_shares(surface, one.vertices)):.0f} mm2, attached to {one.bone.name} "
+            + ("exactly" if one.stiffness is None else f"by springs of {one.stiffness:g} MPa/mm")
+            for one in setup.attached
+        },
+        "effects": {
+            effect.title: {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
+            for effect in case.effects
+        },
+        **({"effects_chosen": [str(one) for one in case.decisions]} if case.decisions else {}),
+        "frames": f"{frames.first} to {frames.last}, every {frames.every}",
+    }
+
+
+def _shape(bone: Bone) -> str:
+    """The number of triangles of a bone's surface, or its closed form."""
+    if bone.solid is None:
+        return f"{len(bone.surface.triangles)} triangles"
+    kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)
+    return f"{kind.strip()} of {', '.join(f'{name} {_said(value)}' for name, value in vars(bone.solid).items())}, mm"
+
+
+def _said(value: float | tuple[float, ...]) -> str:
+    return f"({', '.join(f'{entry:g}' for entry in value)})" if isinstance(value, tuple) else f"{value:g}"
+
+
+def _motion(motion: RigidMotion | None) -> str:
+    if motion is None:
+        return "rests"
+    if isinstance(motion, Translation):
+        how, amounts = f"slides along {_said(motion.direction)}, mm", motion.distances
+    else:
+        how, amounts = f"turns about {_said(motion.centre)} mm along {motion.axis}, rad", motion.angles
+    keys = zip(motion.frames, amounts, strict=True)
+    return f"{how} at frame: {', '.join(f'{amount:g} at {frame:g}' for frame, amount in keys)}"
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
@@ -116,19 +194,13 @@ def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
     return case.model_copy(update={"effect": kept, "decisions": made})
 
 
-def scalar_case(case: Case, place: str | None = None) -> ScalarCase:
-    """The ``case`` itself where it has a scalar field; else InputError at ``place``, by default the file of the case."""
+def scalar_case(case: Case) -> ScalarCase:
+    """The ``case`` itself where it has a scalar field; else InputError."""
     if not isinstance(case, ScalarCase):
-        raise InputError(place or case.place, f'"{case.name}", the case of a muscle', "a scalar case")
+        raise InputError(case.place, f'"{case.name}", the case of a muscle', "a scalar case")
     return case
 
 
-@overload
-def setup(case: MuscleCase) -> Setup: ...
-@overload
-def setup(case: ScalarCase) -> FieldProblem: ...
-@overload
-def setup(case: Case) -> CaseSetup: ...
 def setup(case: Case) -> CaseSetup:
     """The set-up of a case. InputError names what is unusable."""
     if isinstance(case, MuscleCase):

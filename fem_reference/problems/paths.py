@@ -20,11 +20,6 @@ def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
     return float(np.interp(frame, frames, amounts))
 
 
-def _straight(knots: tuple[tuple[float, float], ...]) -> Turning:
-    """The frames of ``knots``, with no rotation between them."""
-    return tuple(frame for frame, _ in knots), (0.0,) * len(knots)
-
-
 @dataclass(frozen=True)
 class Rest:
     """Nothing moves."""
@@ -52,7 +47,15 @@ class Affine:
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The knots, between which every point moves straight."""
-        return _straight(self.knots)
+        return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
+
+
+def radially(
+    share: float, along: tuple[float, float, float] = (1.0, 1.0, 1.0), knots: tuple[tuple[float, float], ...] = ONCE
+) -> Affine:
+    """Displacement away from the origin by ``share`` of the distance times the amount, along axes whose ``along`` is 1, not 0."""
+    x, y, z = along
+    return Affine(((share * x, 0.0, 0.0), (0.0, share * y, 0.0), (0.0, 0.0, share * z)), knots=knots)
 
 
 @dataclass(frozen=True)
@@ -85,23 +88,6 @@ class Turn:
         unit = np.array(self.axis) / np.linalg.norm(self.axis)
         arms = points - np.array(self.centre)
         return unit, arms, arms @ unit if self.per_length else np.ones(len(points))
-
-
-@dataclass(frozen=True)
-class Radial:
-    """Displacement away from the origin by ``share`` of the distance times the amount, along axes whose ``along`` is 1, not 0."""
-
-    share: float
-    along: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    knots: tuple[tuple[float, float], ...] = ONCE
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        return np.asarray(amount(self.knots, frame) * self.share * points * np.array(self.along))
-
-    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The knots, between which every point moves straight."""
-        return _straight(self.knots)
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
-from fem_reference.foundations.records import Record
 
 # The three problems that solvers take: a muscle, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
@@ -43,18 +41,3 @@ class Problem(Protocol):
     @property
     def rest(self) -> AtRest:
         """The shapes that its frames move."""
-
-
-class Meshed(Problem, Protocol):
-    """A problem with its mesh and effects."""
-
-    @property
-    def effects(self) -> tuple[Record, ...]:
-        """The effects that act."""
-
-    @property
-    def mesh_facts(self) -> dict[str, float] | dict[str, float | str]:
-        """Size and quality of its mesh, by name."""
-
-    def write_meshes(self, folder: Path, /) -> None:
-        """Write the mesh of the solution into ``folder``, for ParaView."""

@@ -1,12 +1,10 @@
 """Scalar scenes as arrays for solvers: mesh, effects, boundary conditions. It knows no solver."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.effects import FieldEffect
 from fem_reference.effects.advection import Advection
@@ -111,7 +109,7 @@ def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
         case.element.order,
         case.effects,
         fixed,
-        tuple(_flux(entry, mesh) for entry in case.boundary if entry.slope is not None),
+        tuple(Flux(_facets(entry, mesh), entry.slope) for entry in case.boundary if entry.slope is not None),
         share_above(mesh, average) if mesh.points.shape[1] > 1 else np.zeros(len(mesh.cells)),
         tau if form == "supg" or (form == "auto" and peclet > 1) else None,
         peclet,
@@ -126,9 +124,8 @@ def _check_effects(case: ScalarCase, mesh: FieldMesh) -> None:
     for i, effect in enumerate(case.effects):
         place = join(case.place, f"effect[{i}]")
         if isinstance(effect, Advection) and len(effect.velocity) != dimension:
-            raise InputError(
-                f"{place}.velocity", f"{len(effect.velocity)} components", f"{dimension}, one a coordinate"
-            )
+            got = f"{len(effect.velocity)} components"
+            raise InputError(f"{place}.velocity", got, f"{dimension}, one a coordinate")
         if isinstance(effect, Source):
             _try(effect.strength, mesh.points[mesh.cells].mean(axis=1), f"{place}.strength")
             if effect.where == "y above average" and dimension == 1:
@@ -147,9 +144,8 @@ def _try(formula: str, points: Floats, place: str) -> None:
         raise InputError(place, f'"{formula}" ({error})', "a formula with a value everywhere") from error
     if not np.isfinite(values).all():
         where = ", ".join(f"{x:g}" for x in points[np.flatnonzero(~np.isfinite(values))[0]])
-        raise InputError(
-            place, f'"{formula}", which has no finite value at ({where})', "a formula with a value everywhere"
-        )
+        got = f'"{formula}", which has no finite value at ({where})'
+        raise InputError(place, got, "a formula with a value everywhere")
 
 
 def at(formula: str, points: Floats) -> Floats:
@@ -197,20 +193,20 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
     nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(case.boundary):
         place = join(case.place, f"boundary[{i}]")
-        if entry.on is not None:
-            if entry.where is not None:
-                _try(entry.where, mesh.points, f"{place}.where")
-            facets = _facets(entry, mesh)
-            if entry.slope is not None:
-                if np.isin(_keys(facets, mesh), sloped).any():
-                    raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
-                sloped = np.concatenate([sloped, _keys(facets, mesh)])
-            if len(facets) == 0:
-                raise InputError(
-                    f"{place}.on", f'"{entry.on}", where there is nothing', "an end or a rim of the domain"
-                )
-            key = "slope" if entry.value is None else "value"
-            _try(str(getattr(entry, key)), mesh.points[np.unique(facets)], f"{place}.{key}")
+        if entry.on is None:
+            continue
+        if entry.where is not None:
+            _try(entry.where, mesh.points, f"{place}.where")
+        facets = _facets(entry, mesh)
+        if entry.slope is not None:
+            keys = facets @ [len(mesh.points), 1][-facets.shape[1] :]  # the same for no two
+            if np.isin(keys, sloped).any():
+                raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
+            sloped = np.concatenate([sloped, keys])
+        if len(facets) == 0:
+            raise InputError(f"{place}.on", f'"{entry.on}", where there is nothing', "an end or a rim of the domain")
+        key = "slope" if entry.value is None else "value"
+        _try(str(getattr(entry, key)), mesh.points[np.unique(facets)], f"{place}.{key}")
         if entry.value is not None:
             which = _nodes_of(facets, mesh, case.element.order)
             values = at(entry.value, nodes[which])
@@ -225,23 +221,14 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
 
 def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
     """The facets that a condition is on."""
-    facets, interval = mesh.facets, mesh.cells.shape[1] == 2
-    chosen: dict[str, Callable[[], NDArray[np.bool_]]] = {
-        "left": lambda: mesh.points[facets[:, 0], 0] == mesh.points[:, 0].min(),
-        "right": lambda: mesh.points[facets[:, 0], 0] == mesh.points[:, 0].max(),
-        "rim": lambda: np.ones(len(facets), bool),
-    }
+    facets, x, interval = mesh.facets, mesh.points[:, 0], mesh.cells.shape[1] == 2
     if interval == (entry.on == "rim"):
         return facets[:0]
-    facets = facets[chosen[str(entry.on)]()]
+    if interval:
+        facets = facets[x[facets[:, 0]] == (x.min() if entry.on == "left" else x.max())]
     if entry.where is not None:
         facets = facets[(at(entry.where, mesh.points) > 0)[facets].all(axis=1)]
     return facets
-
-
-def _keys(facets: Ints, mesh: FieldMesh) -> Ints:
-    """A number for each facet, the same for no two."""
-    return np.asarray(facets @ [len(mesh.points), 1][-facets.shape[1] :])
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
@@ -252,14 +239,8 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
     return np.concatenate([vertices, len(mesh.points) + mesh.edge_numbers(facets)])
 
 
-def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:
-    assert entry.slope is not None
-    return Flux(_facets(entry, mesh), entry.slope)
-
-
 def _check_unique(case: ScalarCase, fixed: Floats) -> None:
     """InputError where a constant can be added to the solution."""
     if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
-        raise InputError(
-            join(case.place, "boundary"), "no value anywhere and no reaction", "a value somewhere, or a reaction"
-        )
+        place = join(case.place, "boundary")
+        raise InputError(place, "no value anywhere and no reaction", "a value somewhere, or a reaction")

@@ -6,16 +6,14 @@ All lengths in mm. A region of the surface lists the corners of its facets in th
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Cells, Kind, reference_nodes
+from fem_reference.foundations.mesh import Floats, Ints, connected_parts
+from fem_reference.problems.body import Cells, Kind, facet_corners, reference_nodes
 from fem_reference.problems.checks import check_box
 
 Map = Callable[[Floats], Floats]
@@ -81,8 +79,7 @@ def _merged(points: Floats) -> tuple[Floats, Ints]:
     """The different points (n, 3) among ``points``, and which of them each is."""
     tolerance = _SAME * float(np.ptp(points, axis=0).max())
     first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
-    links = coo_array((np.ones(len(first), bool), (first, second)), shape=(len(points), len(points)))
-    name = np.asarray(connected_components(links, directed=False)[1], np.int64)
+    name = connected_parts(first, second, len(points))
     return points[np.unique(name, return_index=True)[1]], name
 
 
@@ -90,16 +87,8 @@ def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: 
     """The corners (f, 3 or 4) of the facets of ``cells`` that lie on a face of the ``lattice`` of ``grid`` nodes."""
     axis = "xyz".index(face[0])
     there = lattice[..., axis] == int(face[1]) * (grid[axis] - 1)
-    sides = [there[:, list(corners)].all(axis=1) for corners in facet_corners(kind)]
-    return np.concatenate([cells[on][:, list(corners)] for on, corners in zip(sides, facet_corners(kind), strict=True)])
-
-
-def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
-    """Corners of a cell that are those of its facets: the order in a facet is that in the cell."""
-    if kind == "tetrahedron":
-        return list(combinations(range(4), 3))
-    corners = reference_nodes(kind, 1)
-    return [tuple(np.flatnonzero(corners[:, axis] == end).tolist()) for axis in range(3) for end in (0, 1)]
+    sides = [list(corners) for corners in facet_corners(kind)]
+    return np.concatenate([cells[there[:, side].all(axis=1)][:, side] for side in sides])
 
 
 def _upright(points: Floats, cells: Ints, kind: Kind, degree: int) -> Ints:
@@ -115,19 +104,10 @@ _SIX = {face: face for face in ("x0", "x1", "y0", "y1", "z0", "z1")}
 
 
 def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1) -> Cells:
-    """A box from the origin, with its faces x0, x1, y0, y1, z0, z1.
+    """A box from the origin, with its faces x0, x1, y0, y1, z0, z1 and edges of lengths ``size`` [mm] along x, y, z.
 
-    Parameters
-    ----------
-    counts
-        Of cells along x, y, z; a tetrahedral box has six tetrahedra in each.
-    size
-        Edge lengths along x, y, z [mm].
-    kind
-        ``"tetrahedron"`` or ``"hexahedron"``.
-    degree
-        1: straight cells; 2: cells with nodes on their edges too.
-
+    ``counts`` of cells along x, y, z; a tetrahedral box has six tetrahedra in each. ``kind``: ``"tetrahedron"`` or
+    ``"hexahedron"``. ``degree`` 1: straight cells; 2: cells with nodes on their edges too.
     """
     check_box(counts, size, kind, degree)
     return mapped([Brick(lambda unit: unit * size, counts, _SIX)], kind, degree)
@@ -169,19 +149,29 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
     equal angles. Faces: inner, outer, x0, y0, z0.
     """
 
+    def wall(_: Floats, direction: Floats, depth: Floats) -> Floats:
+        return direction * (inner + (outer - inner) * depth)
+
+    return mapped(_patches(wall, (n, n, layers), {"z0": "inner", "z1": "outer"}), kind, degree)
+
+
+def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
+    """Three blocks of an octant around its corner, by their ``place`` from points (n, 3) on the unit cube's outer faces, unit
+    vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the way outward; ``ends``: the faces z0 and z1.
+    """
+
     def patch(axis: int) -> Brick:
         one, other = (other for other in range(3) if other != axis)
 
-        def place(unit: Floats) -> Floats:
-            direction = np.ones_like(unit)
+        def at(unit: Floats) -> Floats:
+            face, direction = np.ones_like(unit), np.ones_like(unit)
+            face[:, [one, other]] = unit[:, :2]
             direction[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
-            radius = inner + (outer - inner) * unit[:, 2]
-            return np.asarray(direction * (radius / np.linalg.norm(direction, axis=1))[:, None])
+            return place(face, direction / np.linalg.norm(direction, axis=1)[:, None], unit[:, 2:])
 
-        faces = {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z0": "inner", "z1": "outer"}
-        return Brick(place, (n, n, layers), faces)
+        return Brick(at, counts, {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0"} | ends)
 
-    return mapped([patch(axis) for axis in range(3)], kind, degree)
+    return [patch(axis) for axis in range(3)]
 
 
 def _square(flat: Floats, half: float) -> Floats:
@@ -272,19 +262,9 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
     size, far = core / n, outer - core
     growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
 
-    def patch(axis: int) -> Brick:
-        one, other = (other for other in range(3) if other != axis)
-
-        def place(unit: Floats) -> Floats:
-            face = np.ones_like(unit)
-            face[:, [one, other]] = unit[:, :2]
-            direction = np.ones_like(unit)
-            direction[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
-            sphere = outer * direction / np.linalg.norm(direction, axis=1)[:, None]
-            share = (growth ** (layers * unit[:, 2:]) - 1) / (growth**layers - 1)
-            return np.asarray(core * face + share * (sphere - core * face))
-
-        return Brick(place, (n, n, layers), {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z1": "outer"})
+    def shell(face: Floats, direction: Floats, depth: Floats) -> Floats:
+        share = (growth ** (layers * depth) - 1) / (growth**layers - 1)
+        return np.asarray(core * face + share * (outer * direction - core * face))
 
     middle = Brick(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
-    return mapped([middle, *(patch(axis) for axis in range(3))], kind, degree)
+    return mapped([middle, *_patches(shell, (n, n, layers), {"z1": "outer"})], kind, degree)

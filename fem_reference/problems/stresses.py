@@ -1,18 +1,28 @@
-"""Stresses by the energies of effects, differentiated by ``jets``, independently of any solver."""
+"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and those that
+effects which a case left out would add.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, Prestrain, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Prestrain, Ramped, State, elastic_state, total_energy
+from fem_reference.effects.contact import among
+from fem_reference.foundations.indicators import Estimates
 from fem_reference.foundations.jets import Jet, JetFunctions, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
+from fem_reference.problems.estimates import ROUNDING, STRESS_TOLERANCE, Decision, decision, solved
+from fem_reference.problems.guess import axis_of, rms
+from fem_reference.problems.problem import Problem
+from fem_reference.problems.setup import Setup
+from fem_reference.scenes.muscle import MuscleCase
 
 Acting = Sequence[tuple[Effect, float]]
 
-# So many tetrahedra are looked at, evenly spread, and so many at once, so that their jets fit in a cache.
-_MOST, _AT_ONCE = 2048, 1024
+# The tetrahedra that are sampled, evenly spread, and the places evaluated at once, so that their jets fit in a cache.
+_MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
 
 
@@ -30,8 +40,8 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
     fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without what time makes.
     """
     found = np.zeros(F.shape)
-    for start in range(0, len(F), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
+    for start in range(0, len(F), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
         jets = variables(F[some].reshape(-1, 9).T)
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JetFunctions())
@@ -62,7 +72,7 @@ class StressSamples:
         self.volumes = tet_volumes(mesh.points, self.tets)
         self.fibre = None if fibre is None else fibre[chosen]
 
-    def sizes(self, positions: Floats, acting: Acting, others: Acting) -> "StressSizes":
+    def sizes(self, positions: Floats, acting: Acting, others: Acting) -> StressSizes:
         """The sizes for what is ``acting``, and for each of the ``others`` on top, where the points are at ``positions`` (n, 3)."""
         F = edge_vectors(positions[self.tets]) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
@@ -96,3 +106,90 @@ def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats)
 def _mean(stress: Floats, volumes: Floats) -> float:
     """The root mean square of the Frobenius norm."""
     return float(np.sqrt(((stress**2).sum(axis=(1, 2)) * volumes).sum() / volumes.sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedFrame:
+    """A frame that was solved: its ``surface`` (n, 3), and the ``stresses`` in its tetrahedra, where there are any."""
+
+    surface: Floats
+    stresses: StressSizes | None
+
+
+class Watch:
+    """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
+
+    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that act. While
+    a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the greatest there was.
+    """
+
+    def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
+        self.case, self.rest, self.known, self.built = case, rest, known, built
+        self.left = tuple(one.effect for one in case.decisions if not one.needed)
+        self.bones = rest.bones if among(self.left) else ()
+        self.frames: dict[float, WatchedFrame] = {}
+
+    @cached_property
+    def sampled(self) -> StressSamples:
+        """The sampled tetrahedra."""
+        rest = self.built().rest
+        assert rest.mesh is not None  # of a muscle that is filled
+        return StressSamples(rest.mesh, rest.directions)
+
+    @property
+    def names(self) -> list[str]:
+        """The effects that are watched for, with their parameters."""
+        return [repr(one) for one in self.left]
+
+    def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
+        """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), where it has tetrahedra."""
+        acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
+        self.frames[number] = WatchedFrame(surface, None if tets is None else self.sampled.sizes(tets, acting, others))
+        return self._found(number, max(self.known.stress_tolerance, STRESS_TOLERANCE * self._most()))
+
+    def end(self) -> tuple[Decision, ...]:
+        """The effects that matter, at the first of all frames at which one does, now that all stresses are known."""
+        if any(one.stresses is None for one in self.frames.values()):
+            return ()
+        tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
+        return next((found for number in sorted(self.frames) if (found := self._found(number, tolerance))), ())
+
+    def _most(self) -> float:
+        return float(np.max([one.stresses.acts if one.stresses else 0.0 for one in self.frames.values()]))
+
+    def _found(self, number: float, stress_tolerance: float) -> tuple[Decision, ...]:
+        watched = self.frames[number]
+        now = self._moving(solved(self.known, self.rest, self.bones, number, watched.surface), number)
+        stretch = watched.stresses.stretch if watched.stresses else now.stretch
+        now = replace(now, stress_tolerance=stress_tolerance, stretch=stretch)
+        each = [self._decided(i, now, watched.stresses) for i in range(len(self.left))]
+        return tuple(replace(one, turned_out=number) for one in each if one.needed)
+
+    def _decided(self, i: int, now: Estimates, stresses: StressSizes | None) -> Decision:
+        """The decision on an effect: by the stress that it adds in the tetrahedra, of fibres by that alone."""
+        effect = self.left[i]
+        found = effect.indicator(now)
+        assert found is not None  # of what was left out
+        if stresses is not None:
+            guessed = 0.0 if "fibre" in effect.needs else found.stress
+            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is
+        return decision(effect, found, now)
+
+    def _moving(self, now: Estimates, number: float) -> Estimates:
+        """The estimates ``now``, with the speed of the surface up to a frame; loads that come by ramps move it, too."""
+        before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
+        if not before:
+            return now
+        numbers = [*before, number]
+        at = np.stack([self.frames[one].surface for one in numbers])
+        velocities = np.diff(at, axis=0) / np.diff(numbers)[:, None, None]
+        last, axis = velocities[-1], axis_of(self.rest)
+        change = float(rms(last - velocities[0] if len(velocities) > 1 else last))
+        sudden = any(isinstance(one, Ramped) for one in self.case.effects)
+        return replace(
+            now,
+            speed=max(now.speed, float(rms(last))),
+            sideways=max(now.sideways, float(rms(last - np.outer(last @ axis, axis)))),
+            jump=max(now.jump, change) if sudden else now.jump,
+            acceleration=max(now.acceleration, change / (number - before[-1])) if len(before) > 1 else now.acceleration,
+        )

@@ -67,6 +67,15 @@ class Contents(Record):
         return self
 
 
+def frame_file(number: float, suffix: str) -> str:
+    """The name of a file of the frame of a ``number``.
+
+    >>> frame_file(10, ".vtp")
+    'frame_0010.vtp'
+    """
+    return f"frame_{number:04.0f}{suffix}"
+
+
 def amend(folder: Path, **changes: Any) -> None:
     """Change the values of some keys in the run.json in ``folder``."""
     place = folder / "run.json"

@@ -11,7 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
 from fem_reference.io import files, texts
-from fem_reference.runs.contents import Contents, RunJson
+from fem_reference.runs.contents import Contents, RunJson, frame_file
 
 FOLDER = "restart"
 # Killed with the process that stores it, or alone, for example for lack of memory or disk space.
@@ -33,9 +33,9 @@ def stored(folder: Path, identity: RunJson) -> RunJson | None:
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
-        if not isinstance(state, dict) or state.get("status") not in ENDED_EARLY or not (folder / FOLDER).is_dir():
+        if not isinstance(state, dict) or state.get("status") not in ENDED_EARLY or not state.get("numbers"):
             return None
-        if not state.get("numbers"):
+        if not (folder / FOLDER).is_dir():
             return None
         whole = parse(Contents, state | {"status": "crashed"}, f"{place}: run")
         wanted = json.loads(json.dumps(identity))
@@ -60,8 +60,8 @@ def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
     """Positions [mm] of the surface (n, 3) and of the points of the tets (k, 3), if any, in a stored frame of the run in
     ``folder``.
     """
-    tets = folder / "tets" / f"frame_{number:04d}.vtu"
-    surface = files.read_surface(folder / "surface" / f"frame_{number:04d}.vtp", 1.0).points
+    tets = folder / "tets" / frame_file(number, ".vtu")
+    surface = files.read_surface(folder / "surface" / frame_file(number, ".vtp"), 1.0).points
     return surface, files.read_points(tets) if tets.is_file() else None
 
 

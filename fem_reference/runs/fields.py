@@ -10,6 +10,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.io import files
+from fem_reference.runs.contents import frame_file
 from fem_reference.runs.states import read_arrays, write_arrays
 
 FOLDER = "field"
@@ -40,7 +41,7 @@ def read(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, F
     """The mesh, and by name the arrays (f, ...) of the frames, of the run in ``folder``; InputError where a file is damaged."""
     frames = []
     for number in numbers:
-        path = folder / FOLDER / f"frame_{number:04d}.npz"
+        path = folder / FOLDER / frame_file(number, ".npz")
         frames.append(read_arrays(path))
         if not {"points", "cells", VALUES} <= frames[-1].keys():
             raise InputError(path, ", ".join(frames[-1]), f"the arrays points, cells and {VALUES}")

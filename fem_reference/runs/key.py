@@ -6,7 +6,7 @@ import importlib.metadata
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -102,19 +102,15 @@ def _module(package: Path, parts: list[str]) -> set[Path]:
 @cache
 def _imported(path: Path, package: Path) -> tuple[str, ...]:
     """Names that the file at ``path`` imports from ``package``: modules, and what may be modules, without the package's name."""
-    return tuple(_names(ast.parse(path.read_bytes()), path, package))
-
-
-def _names(tree: ast.AST, path: Path, package: Path) -> Iterator[str]:
-    start = f"{package.name}."
-    for node in ast.walk(tree):
+    start, found = f"{package.name}.", list[str]()
+    for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
-            yield from (alias.name.removeprefix(start) for alias in node.names if alias.name.startswith(start))
+            found += [alias.name.removeprefix(start) for alias in node.names if alias.name.startswith(start)]
         elif isinstance(node, ast.ImportFrom):
             here = [package.name, *path.parent.relative_to(package).parts]
             base = here[: len(here) + 1 - node.level] if node.level else []
             whole = ".".join([*base, *([node.module] if node.module else [])])
             if f"{whole}.".startswith(start):
                 inside = whole.removeprefix(package.name).removeprefix(".")
-                yield inside
-                yield from (f"{inside}.{alias.name}".lstrip(".") for alias in node.names)
+                found += [inside, *(f"{inside}.{alias.name}".lstrip(".") for alias in node.names)]
+    return tuple(found)

@@ -4,7 +4,7 @@ A run solved with ``store_state = true`` keeps its unknowns. All results follow 
 functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from fem_reference.foundations.jets import JetFunctions, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
-from fem_reference.problems.stresses import first_piola
+from fem_reference.problems.stresses import AT_ONCE, first_piola
 from fem_reference.runs import states, store
 from fem_reference.runs.states import NodalState
 from fem_reference.scenes.case import Case
@@ -37,7 +37,6 @@ NAMES = (
 )
 # A point farther outside the tets than this share of the mesh's diagonal counts as outside; a nearer one is rounding.
 ROUNDING = 1e-9
-_AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,34 +57,22 @@ class Results:
         return tuple(self.states)
 
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
-        """Results at points inside the muscle.
+        """Results by name at ``points`` (n, 3) [mm] of the rest state, at a frame number of ``frames``.
 
-        Parameters
-        ----------
-        points
-            (n, 3) [mm] in the rest state.
-        frame
-            A frame number of ``frames``.
-        names
-                Names of results, by default all that exist: ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
-                ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the
-            volume     grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa];
-                ``fibre_stress`` (n,) [MPa], the stress along the present fibre direction.
+        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
+        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume
+        grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and
+        ``fibre_stress`` (n,) [MPa], the stress along the present fibre direction. InputError where the run has no such frame or
+        result.
 
-        Returns
-        -------
-        dict
-                The arrays by name. A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra:
-            at a     shared point they are those of one tetrahedron. Where det F is not positive the stress is NaN.
-
-        Raises
-        ------
-        InputError
-                Where the run has no such frame or no such result.
-
+        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: at a shared point they are
+        those of one tetrahedron. Where det F is not positive the stress is NaN.
         """
         wanted = self._checked(names, self._state(frame))
-        found = self._located(np.asarray(points, float))
+        found = np.asarray(points, float)
+        if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+            got = f"an array {found.shape}{'' if np.isfinite(found).all() else ' with entries that are not finite'}"
+            raise InputError("points", got, "finite coordinates (n, 3) [mm] in the rest state")
         embedding = self._locator.embed(found)
         inside = np.flatnonzero(embedding.outside <= ROUNDING * self._locator.diagonal)
         values = self.evaluate_in(embedding.tets[inside], embedding.barycentric[inside], frame, wanted)
@@ -97,27 +84,15 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """Results as in :meth:`evaluate`, at points inside given tetrahedra.
-
-        Parameters
-        ----------
-        tets
-            Indices (n,) of the tetrahedra.
-        barycentric
-            Coordinates (n, 4) in them.
-        frame, names
-                As in :meth:`evaluate`.
-
-        """
+        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in the tetrahedra ``tets`` (n,)."""
         state = self._state(frame)
         wanted = self._checked(names, state)
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
         parts = []
-        for start in range(0, max(len(tets), 1), _AT_ONCE):
-            some = slice(start, start + _AT_ONCE)
-            parts.append(
-                _Places(self, state, np.asarray(tets[some], np.int64), barycentric[some]).values(wanted, acting)
-            )
+        for start in range(0, max(len(tets), 1), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            places = _Places(self, state, np.asarray(tets[some], np.int64), barycentric[some])
+            parts.append(places.values(wanted, acting))
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def names(self, state: NodalState) -> tuple[str, ...]:
@@ -149,19 +124,10 @@ class Results:
             raise InputError(f"state at frame {frame:g}", f"arrays {shapes[0]} and {shapes[1]}", want)
         return state
 
-    @staticmethod
-    def _located(points: Floats) -> Floats:
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            got = f"an array {points.shape}{'' if np.isfinite(points).all() else ' with entries that are not finite'}"
-            raise InputError("points", got, "finite coordinates (n, 3) [mm] in the rest state")
-        return points
-
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder or a scene.
-
-    InputError where there is no run with states, or it has another scene. Keys changed after reading the case count too: then the
-    changed scene is needed.
+    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes that it was
+    solved with. InputError where there is no run with states, or it is of another case.
     """
     folder = Path(folder)
     run = store.load(folder)
@@ -204,8 +170,7 @@ class _Places:
             "deformation_gradient": self.F,
             "det_F": self.det_F,
         }
-        if "pressure" in names:
-            values["pressure"] = self.pressure
+        values["pressure"] = self.pressure
         if {"cauchy_stress", "von_mises", "fibre_stress"} & set(names):
             stress = self.cauchy_stress(acting)
             values |= {"cauchy_stress": stress, "von_mises": von_mises(stress)}
@@ -252,43 +217,19 @@ def von_mises(stress: Floats) -> Floats:
 
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
-    """The Lagrange functions of a tetrahedron and their gradients.
+    """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates L (n, 4), and their gradients
+    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the order of
+    ``body.reference_nodes``.
 
     Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite Element Method,
     vol. 1, 8.12).
-
-    Parameters
-    ----------
-    barycentric
-        Coordinates L (n, 4) of points.
-    gradients
-            Gradients of the coordinates, (n, 4, 3) [1/mm].
-    count
-            Number of nodes: 4 or 10, in the order of ``body.reference_nodes``.
-
-    Returns
-    -------
-    values, slopes
-        (n, count), and (n, count, 3) [1/mm].
-
     """
     if count == 4:
         return barycentric, gradients
-    functions, slopes = [], []
-    for i, j in _ends():
-        one, other = barycentric[:, i], barycentric[:, j]
-        if i == j:
-            functions.append(one * (2 * one - 1))
-            slopes.append((4 * one - 1)[:, None] * gradients[:, i])
-        else:
-            functions.append(4 * one * other)
-            slopes.append(4 * (one[:, None] * gradients[:, j] + other[:, None] * gradients[:, i]))
-    return np.stack(functions, axis=1), np.stack(slopes, axis=1)
-
-
-def _ends() -> Iterator[tuple[int, int]]:
-    """The two corners whose middle is each of the ten nodes; for a corner, the corner twice."""
     nodes = reference_nodes("tetrahedron", 2)
-    for weights in np.column_stack([1 - nodes.sum(axis=1), nodes]):
-        near = np.flatnonzero(weights)
-        yield int(near[0]), int(near[-1])
+    near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
+    i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)  # the corners around each node; at a corner, it twice
+    at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
+    one, other = barycentric[:, i], barycentric[:, j]
+    slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])
+    return scale * one * other - at_corner * one, slopes - at_corner[:, None] * gradients[:, i]

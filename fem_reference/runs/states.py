@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.io.files import whole
+from fem_reference.runs.contents import frame_file
 
 FOLDER = "state"
 # The most memory [bytes] for the arrays of a file: a state of a million tetrahedra.
@@ -53,18 +54,7 @@ class NodalState:
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """Write the rest mesh of the states of a run.
-
-    Parameters
-    ----------
-    folder
-            Folder of the run.
-    mesh
-        The tetrahedra at rest.
-    fibre
-        Unit vectors (m, 3) along the fibres in its tetrahedra, None without fibres.
-
-    """
+    """Write the rest ``mesh`` of the states of the run in ``folder``, and the unit vectors ``fibre`` (m, 3) in its tetrahedra."""
     directions = np.zeros((0, 3)) if fibre is None else fibre
     write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
@@ -92,7 +82,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     if not (fits and np.isfinite(points).all()):
         got = f"arrays {points.shape}, {tets.shape} and {fibre.shape}"
         raise InputError(place, got, "finite points (n, 3), tets (m, 4) of them and fibre (m or 0, 3)")
-    return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
+    return TetMesh(points, tets), fibre if len(fibre) else None
 
 
 class StoredStates(Mapping[float, NodalState]):
@@ -106,7 +96,7 @@ class StoredStates(Mapping[float, NodalState]):
         if frame not in self.frames:
             raise KeyError(frame)
         if self.last is None or self.last[0] != frame:
-            place = _place(self.folder, int(frame))
+            place = _place(self.folder, frame)
             arrays = read_arrays(place, _ARRAYS)
             try:
                 self.last = (frame, NodalState.of(arrays))
@@ -122,7 +112,7 @@ class StoredStates(Mapping[float, NodalState]):
 
 
 def _place(folder: Path, frame: float) -> Path:
-    return folder / FOLDER / f"frame_{frame:04.0f}.npz"
+    return folder / FOLDER / frame_file(frame, ".npz")
 
 
 def write_arrays(path: Path, arrays: Arrays) -> None:
@@ -132,20 +122,15 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
         np.savez(part, allow_pickle=False, **arrays)
 
 
-def _check_size(file: BinaryIO) -> None:
-    """Raise ValueError where arrays would take more than ``MOST_BYTES`` of memory."""
-    with zipfile.ZipFile(file) as members:
-        size = sum(member.file_size for member in members.infolist())
-    file.seek(0)
-    if size > MOST_BYTES:
-        raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
-
-
 def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
     """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
     try:
         with path.open("rb") as file:
-            _check_size(file)
+            with zipfile.ZipFile(file) as members:
+                size = sum(member.file_size for member in members.infolist())
+            if size > MOST_BYTES:
+                raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
+            file.seek(0)
             with np.load(file, allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in names or arrays.files}
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file

@@ -30,7 +30,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs import fields
-from fem_reference.runs.contents import Contents, Status
+from fem_reference.runs.contents import Contents, Status, frame_file
 from fem_reference.runs.fields import NodalField
 from fem_reference.runs.states import NodalState
 from fem_reference.scenes.case import Part
@@ -178,7 +178,6 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
         stacked("surface"),
         all(state.surface is not None or state.field is not None for state in states),
     )
-    has_surface = positions is not None
     names = set.intersection(*(set(state.scalars) for state in states)) if states else set()
     nodal = [state.field for state in states if state.field is not None]
     return Run(
@@ -191,7 +190,7 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
         rest.fibres,
         stacked("fibres"),
         {name: np.array([state.scalars[name] for state in states]) for name in names},
-        has_surface=has_surface,
+        has_surface=positions is not None,
         mesh=nodal[0].mesh if nodal else None,
         fields={name: np.stack([one.arrays[name] for one in nodal]) for name in nodal[0].arrays} if nodal else {},
         states=states,
@@ -217,7 +216,7 @@ def load(folder: Path) -> Run:
 
 def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:
     """The surface and the fibres of a run in ``folder``, at rest and moved, as in :class:`Run`."""
-    names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
+    names, has_surface = [frame_file(number, ".vtp") for number in numbers], "surface" in parts
     if has_surface:
         surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
         surface = surfaces[0]

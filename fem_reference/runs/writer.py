@@ -16,7 +16,7 @@ from typing import Any
 from fem_reference.io import files
 from fem_reference.problems.problem import NOTHING, AtRest
 from fem_reference.runs import cut_off, fields, states
-from fem_reference.runs.contents import FORMAT
+from fem_reference.runs.contents import FORMAT, RunJson, frame_file
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome
 
@@ -31,17 +31,12 @@ class Writer:
     each frame, then ``close``. A frame that is already stored replaces the stored one and all after it.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        identity: dict[str, Any],
-        rest: AtRest = NOTHING,
-    ) -> None:
+    def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING) -> None:
         """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the requested numbers), as in run.json; ``rest``: the
         shapes that its frames move.
         """
         self.folder, self.rest = folder, rest
-        self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
+        self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
         if (stored := cut_off.stored(folder, identity)) is not None:
@@ -84,8 +79,8 @@ class Writer:
         for part, write in parts.items():
             suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
             (self.folder / part).mkdir(exist_ok=True)
-            write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
-            names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
+            names = [(number, f"{part}/{frame_file(number, suffix)}") for number in self.state["numbers"]]
+            write(self.folder / names[-1][1])
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
             unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # for effects added since

@@ -1,11 +1,11 @@
 """Rigid bodies of a scene as frozen records: a surface in a file or a closed form, and how it moves."""
 
 import math
-from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.foundations.records import Name, Record
@@ -14,6 +14,15 @@ from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 
 # Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
 _FINEST = 1e-3
+
+
+Vector = tuple[float, float, float]
+
+
+def _checked_direction(direction: Vector, name: str) -> Vector:
+    if not 1e-9 < math.hypot(*direction) < 1e9:
+        raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
+    return direction
 
 
 class Keyframe(Record):
@@ -27,19 +36,10 @@ class Keyframe(Record):
 class Motion(Record):
     """A rotation about a fixed ``axis`` through a ``centre`` or a translation along a ``direction``, linear between keyframes."""
 
-    axis: tuple[float, float, float] | None = None
+    axis: Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))] | None = None
     centre: Point | None = None
-    direction: tuple[float, float, float] | None = None
+    direction: Annotated[Vector, AfterValidator(partial(_checked_direction, name="a direction"))] | None = None
     keyframes: tuple[Keyframe, ...] = Field(min_length=2)
-
-    @field_validator("axis", "direction")
-    @classmethod
-    def _check_direction(
-        cls, direction: tuple[float, float, float] | None, info: ValidationInfo
-    ) -> tuple[float, float, float] | None:
-        if direction is None:
-            return None
-        return _checked_direction(direction, f"{'an' if info.field_name == 'axis' else 'a'} {info.field_name}")
 
     @field_validator("keyframes")
     @classmethod
@@ -56,8 +56,7 @@ class Motion(Record):
         given = [self.axis is not None, self.centre is not None, self.direction is not None]
         if given not in ([True, True, False], [False, False, True]):
             raise ValueError('either "axis" and "centre" (a rotation) or "direction" (a translation)')
-        frames = [keyframe.frame for keyframe in self.keyframes]
-        if any(late <= early for early, late in pairwise(frames)):
+        if any(late.frame <= early.frame for early, late in pairwise(self.keyframes)):
             raise ValueError("keyframes in the order of their frames")
         return self
 
@@ -75,12 +74,7 @@ class CaseHalfSpace(Record):
     """All that lies behind the plane through ``point`` across ``normal``, which points out of it."""
 
     point: Point
-    normal: tuple[float, float, float]
-
-    @field_validator("normal")
-    @classmethod
-    def _check_normal(cls, normal: tuple[float, float, float]) -> tuple[float, float, float]:
-        return _checked_direction(normal, "a normal")
+    normal: Annotated[Vector, AfterValidator(partial(_checked_direction, name="a normal"))]
 
 
 class CaseBox(Record):
@@ -92,7 +86,7 @@ class CaseBox(Record):
 
     @field_validator("size")
     @classmethod
-    def _check_size(cls, size: tuple[float, float, float]) -> tuple[float, float, float]:
+    def _check_size(cls, size: Vector) -> Vector:
         if not min(size) > 0:
             raise ValueError("three lengths above zero")
         return size
@@ -121,7 +115,7 @@ class Rod(Record):
 
     @field_validator("end")
     @classmethod
-    def _check_end(cls, end: tuple[float, float, float], info: ValidationInfo) -> tuple[float, float, float]:
+    def _check_end(cls, end: Vector, info: ValidationInfo) -> Vector:
         if "start" in info.data and not math.dist(info.data["start"], end) > 1e-9:
             raise ValueError("another point than the start")
         return end
@@ -149,7 +143,7 @@ class CaseBone(Record):
     def _check(self) -> Self:
         forms = ("surface", *CLOSED_FORMS)
         if sum(getattr(self, form) is not None for form in forms) != 1:
-            raise ValueError(f"exactly one of {_quoted(forms)}")
+            raise ValueError(f"exactly one of {', '.join(f'"{form}"' for form in forms)}")
         if (self.surface is None) != (self.unit is None):
             raise ValueError('"unit" beside "surface" and only there')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
@@ -158,13 +152,3 @@ class CaseBone(Record):
             if not _FINEST <= getattr(self, key) <= most:
                 raise ValueError(f'"{key}" from {_FINEST:g} to {most:g} mm')
         return self
-
-
-def _checked_direction(direction: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    if not 1e-9 < math.hypot(*direction) < 1e9:
-        raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
-    return direction
-
-
-def _quoted(names: Sequence[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names)

@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -160,9 +160,8 @@ class Case(Record):
         if text.startswith("data:"):
             root = os.environ.get(DATA_SETTING)
             if not root:
-                raise InputError(
-                    place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER"
-                )
+                got = f'"{text}" while {DATA_SETTING} is not set'
+                raise InputError(place, got, f"the setting {DATA_SETTING}=FOLDER")
             path = Path(root) / text.removeprefix("data:")
         elif text.startswith("mesh:"):
             path = HOME / "meshes" / text.removeprefix("mesh:")
@@ -179,12 +178,8 @@ class Case(Record):
         """
         if not self.from_file:
             return
-        settings = (os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
-        folders = [
-            self.folder,
-            HOME / "meshes",
-            *(Path(one) for one in os.pathsep.join(settings).split(os.pathsep) if one),
-        ]
+        settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
+        folders = [self.folder, HOME / "meshes", *map(Path, filter(None, settings.split(os.pathsep)))]
         if not is_inside(path, folders):
             want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
@@ -233,24 +228,18 @@ def is_inside(path: Path, folders: Iterable[Path]) -> bool:
 def _unnamed(tables: Any, names: Collection[str]) -> Any:
     """The ``tables``, of the files that they name the suffix alone, which says how they are read."""
     if isinstance(tables, dict):
-        return {
-            name: Path(value).suffix
-            if name in names and isinstance(value, str) and value != DELAUNAY
-            else _unnamed(value, names)
-            for name, value in tables.items()
-        }
+        files = {name for name, text in tables.items() if name in names and isinstance(text, str) and text != DELAUNAY}
+        return {name: Path(value).suffix if name in files else _unnamed(value, names) for name, value in tables.items()}
     return [_unnamed(value, names) for value in tables] if isinstance(tables, list) else tables
 
 
-def _files(tables: Any, names: Collection[str], key: str = "") -> list[tuple[str, str]]:
+def _files(tables: Any, names: Collection[str], key: str = "") -> Iterator[tuple[str, str]]:
     """Every (key, text) below ``tables`` that names a file."""
-    if isinstance(tables, dict):
-        found = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items() if name in names]
-        below = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items()]
-    else:
-        found, below = (
-            [],
-            [(f"{key}[{i}]", value) for i, value in enumerate(tables)] if isinstance(tables, list) else [],
-        )
-    named = [(where, text) for where, text in found if isinstance(text, str) and text != DELAUNAY]
-    return named + [entry for where, value in below for entry in _files(value, names, where)]
+    if isinstance(tables, list):
+        for i, value in enumerate(tables):
+            yield from _files(value, names, f"{key}[{i}]")
+    for name, value in tables.items() if isinstance(tables, dict) else ():
+        where = f"{key}.{name}".lstrip(".")
+        if name in names and isinstance(value, str) and value != DELAUNAY:
+            yield where, value
+        yield from _files(value, names, where)

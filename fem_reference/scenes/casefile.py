@@ -41,9 +41,9 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
         _change(table, key, value, str(path))
     scene = _scene(table, path)
     asked = not changes or any(key.startswith("negative_control") for key in changes)
-    if not with_negative_control and not (asked and "negative_control" in table):
+    if not with_negative_control and not (asked and scene.negative_control):
         return scene
-    changed = _with_negative_control(table, path)
+    changed = _with_negative_control(scene, table, path)
     if asked:
         _check_negative_control(scene, changed)
     return changed if with_negative_control else scene
@@ -129,10 +129,11 @@ def muscle(case: Case, place: str | None = None) -> MuscleCase:
     return case
 
 
-def _with_negative_control(table: dict[str, Any], path: Path) -> Case:
-    """The scene with its negative control applied; ``table`` stays as it is."""
-    place = str(path)
-    control = parse(NegativeControl, table.get("negative_control"), join(place, "negative_control"))
+def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Case:
+    """The ``case`` of ``table`` with its negative control applied; ``table`` stays as it is."""
+    place, control = str(path), case.negative_control
+    if control is None:
+        raise InputError(join(place, "negative_control"), "None", "a key to change, its value, and why")
     table = deepcopy(table)
     try:
         _change(table, control.key, control.value, place, add=False)
@@ -176,9 +177,9 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     if "effect" in table:
         table = table | {"effect": effects(table["effect"], place, kind)}
     case: Case = parse(record, table | whose, place)
-    reference, *others = _candidate_names(case)
-    expected = [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)]
-    _check_used([reference, "candidates", *others], expected, place)
+    runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
+    _check_once(runs, join(place, "candidate"))
+    _check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     if isinstance(case, MuscleCase):
         _check_names(case)
         _check_rest(case)
@@ -192,30 +193,24 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
     names = [entry["name"] for entry in entries]
     _check_effects(names, found, place)
-    _check_moduli(names, found, place)
     return found
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface."""
-    acting = [
-        (name, effect.on if isinstance(effect, Load) else "") for name, effect in zip(names, effects, strict=True)
-    ]
+    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface. A
+    bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
+    """
+    acting = [(name, getattr(effect, "on", "")) for name, effect in zip(names, effects, strict=True)]
+    known = [moduli([effect]) for effect in effects]
+    shear, stiff = sum(one.shear for one in known), [name for name, one in zip(names, known, strict=True) if one.shear]
     for i, (name, on) in enumerate(acting):
         if (name, on) in acting[:i]:
             again = f'"{name}" on "{on}" a second time' if on else f'"{name}" a second time'
             raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
-
-
-def _check_moduli(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """A bulk modulus below the shear modulus is of no tissue, and usually a slip of units."""
-    known = [moduli([effect]) for effect in effects]
-    shear, stiff = sum(one.shear for one in known), [name for name, one in zip(names, known, strict=True) if one.shear]
-    for i, (effect, one) in enumerate(zip(effects, known, strict=True)):
-        if 0 < one.bulk < shear:
-            key = ".bulk" if "bulk" in type(effect).model_fields else ""
+        if 0 < known[i].bulk < shear:
+            key = ".bulk" if "bulk" in type(effects[i]).model_fields else ""
             want = f"at least the shear modulus of {' and '.join(stiff)}, {shear:g} MPa"
-            raise InputError(join(place, f"effect[{i}]{key}"), f"{one.bulk:g} MPa", want)
+            raise InputError(join(place, f"effect[{i}]{key}"), f"{known[i].bulk:g} MPa", want)
 
 
 def _effect(table: Any, place: str, kind: type[Record]) -> Record:
@@ -253,13 +248,6 @@ def _check_forces(case: MuscleCase) -> None:
     ):
         want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
         raise InputError(join(case.place, "attachment"), "none", want)
-
-
-def _candidate_names(case: Case) -> list[str]:
-    """Names of runs: the reference and each candidate, which have names of their own."""
-    names = ["reference", *(candidate.name for candidate in case.candidate)]
-    _check_once([*names, "candidates"], join(case.place, "candidate"))
-    return names
 
 
 def _check_once(names: list[str], place: str) -> None:

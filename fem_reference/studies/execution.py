@@ -18,7 +18,7 @@ from fem_reference.problems.estimates import Decision
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
-from fem_reference.problems.watch import Watch
+from fem_reference.problems.stresses import Watch
 from fem_reference.runs import cut_off, store
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run, collected

@@ -17,7 +17,7 @@ from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.problems.watch import Watch
+from fem_reference.problems.stresses import Watch
 from fem_reference.runs import cut_off, states, store
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Frame, Outcome, Run

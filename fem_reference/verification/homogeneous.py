@@ -14,7 +14,7 @@ from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.paths import Affine, Along, Matrix, Radial
+from fem_reference.problems.paths import Affine, Along, Matrix, radially
 from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SURFACE, SYMMETRY, resistance
 from fem_reference.verification.truths import find
@@ -55,7 +55,7 @@ def guccione(c: float) -> Material:
 
 def stretched(face: str, stretch: float) -> Prescribed:
     """The face x1, y1 or z1 moved along its normal to ``stretch`` times its distance."""
-    return Prescribed(face, face, ("xyz".index(face[0]),), Radial(stretch - 1))
+    return Prescribed(face, face, ("xyz".index(face[0]),), radially(stretch - 1))
 
 
 def everywhere(gradient: Matrix) -> tuple[Prescribed, ...]:

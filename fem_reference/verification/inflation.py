@@ -16,7 +16,7 @@ from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.paths import Radial
+from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
 from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
 from fem_reference.verification.truths import find
@@ -58,7 +58,7 @@ def slope(solved: Run) -> Chebyshev:
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
     """A ``reading`` of the sphere whose inner face is moved out: it encloses ``pi a^3 / 6``."""
     largest, read = reading
-    grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
+    grown = Prescribed("inner", "inner", (0, 1, 2), radially(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
     body = Body(sphere(element, n, degree), material, (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
@@ -84,7 +84,7 @@ def pressed(lab: Lab, n: int, mu: float) -> float:
 def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Run:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
-    grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
+    grown = Prescribed("inner", "inner", (0, 1), radially(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
     fixed = (*SYMMETRY[:2], *clamped(*ends, components=(2,)), grown)
     body = Body(mesh, neo_hooke(MU, BULK), fixed, stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fem_reference.foundations.motion import Rotation, Translation
-from fem_reference.problems.paths import Affine, Along, Follows, From, Radial, Rest, Turn, amount
+from fem_reference.problems.paths import Affine, Along, Follows, From, Rest, Turn, amount, radially
 
 POINTS = np.random.default_rng(3).uniform(-5, 5, (12, 3))
 THERE_AND_BACK = ((0.0, 0.0), (2.0, 1.0), (4.0, -1.0))
@@ -63,7 +63,7 @@ def test_a_twist_turns_each_plane_by_its_height() -> None:
 
 
 def test_radial_points_go_away_along_the_axes_that_count() -> None:
-    path = Radial(0.2, (1.0, 0.0, 1.0))
+    path = radially(0.2, (1.0, 0.0, 1.0))
     assert path(POINTS, 0.5) == pytest.approx(0.1 * POINTS * [1, 0, 1], abs=1e-12)
     assert path.turning(POINTS) == ((0.0, 1.0), (0.0, 0.0))
 
@@ -96,5 +96,5 @@ def test_fibres_along_one_direction_have_it_everywhere() -> None:
 
 def test_paths_reach_another_process() -> None:
     turned = Rotation((1, 2, 2), (5.0, 0.0, 1.0), (0.0, 10.0), (0.0, 0.8))
-    for path in (Turn((0.0, 1.0, 0.0), 0.7), Radial(0.1), Follows(From(2.0, turned.pose))):
+    for path in (Turn((0.0, 1.0, 0.0), 0.7), radially(0.1), Follows(From(2.0, turned.pose))):
         assert np.array_equal(pickle.loads(pickle.dumps(path))(POINTS, 3.0), path(POINTS, 3.0))

@@ -1,11 +1,19 @@
-"""Stresses of effects in a state, beside closed forms of a bar that is stretched."""
+"""Stresses of effects in a state, beside closed forms of a stretched bar; omitted effects, evaluated in solved frames."""
+
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import random_scenes
 import shapes
+import small
+from auto_scenes import ACTIVE, STILL, pennate, scene_of, solved_as
 
 from fem_reference.effects import make
-from fem_reference.problems.stresses import StressSamples, kirchhoff
+from fem_reference.problems import muscle, of_case
+from fem_reference.problems.stresses import StressSamples, StressSizes, kirchhoff
+from fem_reference.studies.execution import Bench
 
 
 def test_stresses_of_a_stretched_bar_are_those_of_the_closed_form() -> None:
@@ -42,3 +50,58 @@ def test_a_prestretch_counts_by_what_it_changes_of_the_rest() -> None:
     assert own.acts == pytest.approx(uniaxial)
     assert own.added == pytest.approx([doubly - uniaxial])
     assert found.added == pytest.approx([mu * (stretch**2 - 1 / stretch) * np.sqrt(2 / 3)], rel=1e-9)
+
+
+def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
+    """They are slack up to more than is guessed of the turn, and the run stretched them by more than that."""
+    scene = of_case.chosen(scene_of(tmp_path, small.FIBRES.format(slack=1.3)))
+    rest = muscle.setup(scene)
+    assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
+    still, longer = rest.surface.points, rest.surface.points * 1.6
+    watch = of_case.watch(scene, rest, lambda: None)
+    assert watch.see(0, still, None) == ()
+    (late,) = watch.see(10, longer, None)
+    assert "FibrePassive: needed as it turned out at frame 10" in str(late)
+
+
+def test_an_effect_whose_stress_is_no_number_is_needed(tmp_path) -> None:
+    """Energies with logarithms have none beyond their range: nothing shows that such an effect may be left out."""
+    weight = random_scenes.EFFECTS["gravity"].format(density=1e-6, weight="0, 0, -9.81")
+    watch = Bench(pennate(tmp_path / "scene", "auto", weight), tmp_path / "runs").watch()
+    rest = watch.rest.surface.points
+    for added, titles in ((0.0, []), (np.nan, ["Gravity"])):
+        watch.sampled = SimpleNamespace(sizes=lambda *_, added=added: StressSizes(1.0, (added,), (1.0, 1.0)))
+        assert [one.effect.title for one in watch.see(0, rest, rest)] == titles
+
+
+def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:
+    """Bones rest, so that there is no drag by what is known before; the solution moves."""
+    made = solved_as(
+        monkeypatch, lambda points, number: points + [0.5 * number * np.sin(np.pi * points[:, 2:] / 40), 0, 0][0]
+    )
+    drag = random_scenes.EFFECTS["damping"].format(drag=1e-2)
+    scene = pennate(tmp_path / "scene", "auto", ACTIVE + drag)
+    bench = Bench(scene, tmp_path / "runs")
+    assert "Damping: left out" in str(bench.scene.decisions[-1])
+    bench.obtain("reference", scene.reference, "reference")
+    assert [len(titles) for titles in made] == [3, 4]
+
+
+def test_at_its_end_a_run_is_judged_by_the_stress_that_there_was(tmp_path, monkeypatch) -> None:
+    """Bones draw at springs that yield: the matrix is hardly strained, and the weight is more than was thought beside it."""
+    weight = random_scenes.EFFECTS["gravity"].format(density=10.0, weight="0, 0, -9.81")
+    case = random_scenes.TEXT.format(**STILL | {"distance": 12.0}, choice="auto", effects=weight)
+    found = []
+    for name, strain in (("loose", 1e-3), ("tight", 0.3)):
+        made = solved_as(monkeypatch, partial(longer, strain))
+        scene = random_scenes.write(tmp_path / name, case, random_scenes.lines(0.0, 0.0))
+        bench = Bench(scene, tmp_path / f"runs {name}")
+        assert "Gravity: left out" in str(bench.scene.decisions[-1])
+        bench.obtain("reference", scene.reference, "reference")
+        found.append([len(titles) for titles in made])
+    assert found == [[2, 3], [2]]
+
+
+def longer(strain, points, number):
+    """Points of a bar that gets longer by a ``strain`` up to frame 4, and thinner."""
+    return points * (1 + strain * number / 4 * np.array([-0.5, -0.5, 1.0]))

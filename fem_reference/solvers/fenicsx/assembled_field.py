@@ -10,6 +10,7 @@ from fem_reference.foundations.formula import FUNCTIONS, evaluate
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
 
 import basix  # isort: skip - after the door
@@ -67,8 +68,8 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
     return found
 
 
-def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
-    """The values (N,) in the order of the problem, not-a-number after a failure, and the numbers to report."""
+def solve(problem: FieldProblem) -> tuple[Floats, Outcome]:
+    """The values (N,) in the order of the problem, not-a-number after a failure, and the outcome."""
     begin = time.perf_counter()
     forget_peak_memory()
     left, right, space, node = equations(problem)
@@ -85,9 +86,9 @@ def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
     }
     values = np.full(len(node), np.nan)
     if failure is not None:
-        return values, {"status": "diverged", "message": failure, "cost": cost}
+        return values, Outcome("diverged", failure, cost)
     values[node] = found
-    return values, {"status": "converged", "message": f"{len(node)} nodes", "cost": cost}
+    return values, Outcome("converged", f"{len(node)} nodes", cost)
 
 
 def _state(function: Any) -> FieldState:

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from fem_reference.effects import Effect, Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body, Prescribed
+from fem_reference.runs.states import NodalState
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
@@ -260,9 +261,9 @@ class AssembledBody:
         """The present positions (n, 3) [mm] of the nodes of the body's mesh."""
         return self.nodes.positions()
 
-    def state(self) -> dict[str, Any]:
-        """The arrays of ``states.NodalState`` by name; empty where they were not requested."""
-        return {} if self.nodal is None else self.nodal.state().arrays
+    def state(self) -> NodalState | None:
+        """The unknowns of every cell; None where they were not requested."""
+        return None if self.nodal is None else self.nodal.state()
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
         """The present positions (n, 3) [mm] of rest ``points`` (n, 3), each in a cell of ``cells`` (n,); on every rank."""
@@ -287,6 +288,6 @@ def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spen
     system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # the type that the stubs declare
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
-        return Multigrid(system, settings.element, spent)
+        return Multigrid(system, spent)
     precision = settings.precision or ("double" if kind == "direct" else "single")
     return Factorised(system.matrix, symmetric, kind == "lagged", precision, spent)

@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: one process at a time compiles a form and removes incomplete files of others."""
+"""Compilation of forms for this machine: one process at a time compiles a form, and removes incomplete files of it before."""
 
 import hashlib
 import os
@@ -7,9 +7,7 @@ import signal
 import subprocess
 import sysconfig
 import tempfile
-import time
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
 from ctypes import CDLL
 from functools import cache, wraps
 from pathlib import Path
@@ -20,13 +18,12 @@ import ffcx.codegeneration.jit as generator
 import ufl
 from dolfinx import fem, jit
 from ffcx import naming
-from filelock import FileLock, Timeout
+from filelock import FileLock
 from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-PATIENCE = 300  # [s] that a process waits for a compilation without a lock
-_LOCKS = 64  # shared by the forms; a locked one shows that something is compiled
+_LOCKS = 64  # shared by the forms
 
 
 @cache
@@ -52,43 +49,48 @@ FLAGS = [
     "-freciprocal-math",
 ]
 # FFCx stores compiled forms under their content and these options, the machine among them.
-OPTIONS: dict[str, Any] = {
-    "timeout": PATIENCE,
-    "cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"],
-}
-
-
-def lock(folder: Path, number: int) -> FileLock:
-    """The lock of that ``number``, among those that forms share, in the ``folder`` of compiled forms."""
-    return FileLock(folder / f".fem_reference_{number}.lock")
+OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"]}
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, run by one process at a time for the same form. FFCx assumes that no file of a form exists once it has
-    compiled it, and fails on files that an interrupted or presumed dead process left.
-    """
+    """FFCx's compilation, run by one process at a time for the same form."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
         folder = Path(str(options["cache_dir"]))
         folder.mkdir(parents=True, exist_ok=True)
-        with lock(folder, int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS):
-            try:
-                return compiled(objects, *given, **options)
-            except (FileExistsError, ModuleNotFoundError, TimeoutError):
-                _remove_broken(folder)
+        number = int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS
+        with FileLock(folder / f".fem_reference_{number}.lock"):
             return compiled(objects, *given, **options)
 
     return waiting
 
 
+def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
+    """FFCx's search for a compiled form, after incomplete files of it are removed. As the process has the form's lock, none is in
+    progress: an interrupted or killed process left them, and FFCx would wait for them.
+    """
+
+    @wraps(search)
+    def found(name: str, objects: list[str], cache_dir: Path, timeout: int) -> R:
+        source = Path(cache_dir, f"{name}.c")
+        libraries, marks = list(source.parent.glob(f"{name}.*so")), (source, source.with_suffix(".c.cached"))
+        if not (libraries and all(path.exists() for path in marks)):
+            for path in (*libraries, *marks):
+                path.unlink(missing_ok=True)
+        return search(name, objects, cache_dir, timeout)
+
+    return found
+
+
 generator.compile_forms = _alone(generator.compile_forms)
 generator.compile_expressions = _alone(generator.compile_expressions)
+generator.get_cached_module = _complete(generator.get_cached_module)
 
 
-def form(expression: Any, entity_maps: Any = None) -> Any:
-    """A compiled form; ``entity_maps`` relate the meshes that it combines."""
-    return fem.form(expression, jit_options=OPTIONS, entity_maps=entity_maps)
+def form(expression: Any) -> Any:
+    """A compiled form."""
+    return fem.form(expression, jit_options=OPTIONS)
 
 
 def expression(value: Any, points: Any) -> Any:
@@ -128,46 +130,18 @@ def library(source: Path, sizes: dict[str, int]) -> CDLL:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as new:
             made = Path(new) / kept.name
-            _compile([*compiler, *words, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made)])
+            command = [*compiler, *words, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made)]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise RuntimeError(f"{command[0]} cannot compile {source}: {done.stderr.strip()}")
             made.replace(kept)  # atomic, also where several processes compile it
     return CDLL(str(kept))
 
 
-def _compile(command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{command[0]} cannot compile {command[-3]}: {done.stderr.strip()}")
-
-
 def prepare() -> None:
-    """Make an interrupted compilation clean up, and remove incomplete files of processes that could not: others would wait for
-    them.
-    """
+    """Let FFCx clean up after an interrupted compilation."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, _stop)
-    folder = Path(jit.get_options()["cache_dir"])
-    with ExitStack() as locks:
-        try:
-            for path in folder.glob(".fem_reference_*.lock"):
-                locks.enter_context(FileLock(path).acquire(timeout=0))
-        except Timeout:  # an incomplete file may still be in progress
-            return
-        _remove_broken(folder)
-
-
-def _remove_broken(folder: Path) -> None:
-    """Remove files begun ``PATIENCE`` ago and not finished, and marks of finished forms that lack a file."""
-    for source in folder.glob("*.c"):
-        with suppress(FileNotFoundError):
-            done = source.with_suffix(".c.cached").exists()
-            if not done and time.time() - source.stat().st_mtime > PATIENCE:
-                source.unlink()
-    libraries = {path.name.partition(".")[0] for path in folder.glob("*.so")}
-    for ready in folder.glob("*.c.cached"):
-        source = ready.with_suffix("")
-        if not source.exists() or source.stem not in libraries:
-            source.unlink(missing_ok=True)
-            ready.unlink(missing_ok=True)
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:

@@ -1,18 +1,16 @@
-"""Messages between the caller and the solving process: jobs, frames, and the state from which a run continues."""
+"""Jobs of the solving process, and the stored states from which a run continues."""
 
 import json
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, fingerprint
 from fem_reference.problems.body import Body
-from fem_reference.problems.problem import Task
+from fem_reference.runs.contents import frame_file
 from fem_reference.runs.cut_off import CutOff
-from fem_reference.runs.states import NodalState, read_arrays
+from fem_reference.runs.states import read_arrays
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 
@@ -28,7 +26,7 @@ class Kept:
 
     def place(self, frame: float) -> Path:
         """The file of a frame."""
-        return self.folder / f"frame_{frame:04.0f}.npz"
+        return self.folder / frame_file(frame, ".npz")
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
@@ -56,15 +54,7 @@ class Job:
     ``kept``: the states that are kept, if any.
     """
 
-    task: ClassVar[Task] = "solve_body"
-
     body: Body
     settings: BodySettings
     samples: dict[str, tuple[Ints, Floats]] = field(default_factory=dict)
     kept: Kept | None = None
-
-
-def stored_state(arrays: Mapping[str, Any]) -> NodalState | None:
-    """The unknowns of the cells among the ``arrays`` of a frame, None where they were not requested."""
-    own = {name.removeprefix("state "): arrays[name] for name in arrays if name.startswith("state ")}
-    return NodalState.of(own) if own else None

@@ -31,14 +31,29 @@ class LinearSolveError(ArithmeticError):
 class LinearSolver(Protocol):
     """Solves with a matrix that changes."""
 
-    def changed(self) -> None:
-        """Note that the matrix has changed."""
-
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
 
     def solve_exactly(self) -> bool:
         """Solve each system exactly from now on; True where that is a change."""
+
+
+def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
+    """FGMRES with the present ``matrix``, for at most so many iterations, still without a preconditioner."""
+    krylov = PETSc.KSP().create(matrix.comm)
+    krylov.setType("fgmres")
+    krylov.setGMRESRestart(most)
+    krylov.setOperators(matrix, matrix)
+    return krylov
+
+
+def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, most: int, spent: Spent) -> bool:
+    """Solve for ``x`` in at most so many iterations; True where that reaches ``tolerance`` times the norm of ``b``."""
+    with spent.on("krylov"):
+        krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
+        krylov.solve(b, x)
+    spent.counts["krylov_iterations"] += krylov.getIterationNumber()
+    return bool(krylov.is_converged)
 
 
 class Factorised:
@@ -50,17 +65,14 @@ class Factorised:
         self.matrix, self.symmetric, self.spent = matrix, symmetric, spent
         self.lagged = lagged
         self._choose(precision)
-        self.fresh = self.there = False
+        self.factorised: int | None = None  # PETSc's count of changes of the matrix, at its last factorisation
         self.limit = _LEAST
         self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
 
     def _choose(self, precision: str) -> None:
         self.precision = precision
-        self.krylov = PETSc.KSP().create(self.matrix.comm)
+        self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
-        self.krylov.setType("fgmres")
-        self.krylov.setGMRESRestart(_MOST)
-        self.krylov.setOperators(self.matrix, self.matrix)
         self.preconditioner = self.krylov.getPC()
         self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
         self.preconditioner.setFactorSolverType("mumps")
@@ -76,15 +88,16 @@ class Factorised:
             self.factors.setMumpsIcntl(_COMPRESSION, 2)
             self.factors.setMumpsCntl(_DROPPED, 1e-5)
 
-    def changed(self) -> None:
-        """Note that the matrix has changed."""
-        self.fresh = False
+    @property
+    def fresh(self) -> bool:
+        """True where the factors are those of the present matrix."""
+        return self.factorised == self.matrix.stateGet()
 
     def solve_exactly(self) -> bool:
         """Factorise each matrix from now on, in double precision; True where that is a change."""
         if not self.lagged:
             return False
-        self.lagged = self.fresh = self.there = False
+        self.lagged, self.factorised = False, None
         if self.precision == "single":
             self._choose("double")
         return True
@@ -98,10 +111,9 @@ class Factorised:
             self.preconditioner.setReusePreconditioner(True)
         self.spent.counts["factorisations"] += 1
         if self.factors.getMumpsInfog(_ERROR) < 0:
-            self.there = False
+            self.factorised = None
             raise LinearSolveError(f"MUMPS reports {self.factors.getMumpsInfog(_ERROR)}")
-        self.fresh = self.there = True
-        self.since = 0
+        self.factorised, self.since = self.matrix.stateGet(), 0
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
@@ -114,20 +126,16 @@ class Factorised:
             tolerance = _EXACT
         # A factorisation whose iterations took as long as a new one is replaced: at most twice the time of perfect foresight.
         serves = self.fresh or (self.lagged and self.since < self.limit)
-        if self.there and serves and self._iterate(b, x, tolerance, self.limit):
+        if self.factorised is not None and serves and self._iterate(b, x, tolerance, self.limit):
             return
         self.factorise()
         if not self._iterate(b, x, tolerance, _MOST):
             raise LinearSolveError("FGMRES does not converge with the factorisation of the matrix itself")
 
     def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, most: int) -> bool:
-        with self.spent.on("krylov"):
-            self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
-            self.krylov.solve(b, x)
-        taken = self.krylov.getIterationNumber()
-        self.spent.counts["krylov_iterations"] += taken
-        self.since += 0 if self.fresh else taken
-        return bool(self.krylov.is_converged)
+        converged = iterate(self.krylov, b, x, tolerance, most, self.spent)
+        self.since += 0 if self.fresh else self.krylov.getIterationNumber()
+        return converged
 
     def negative_pivots(self) -> int:
         """The negative pivots of the present matrix, which is factorised if necessary. Where single precision does not resolve

@@ -6,14 +6,14 @@ Pressure block: the mass matrix over local stiffness, which is spectrally equiva
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
-import basix
 import numpy as np
+from dolfinx import fem
+from dolfinx.fem.petsc import interpolation_matrix
 from petsc4py import PETSc
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Ints
-from fem_reference.problems.body import ELEMENTS
-from fem_reference.solvers.fenicsx.linear import LinearSolveError
+from fem_reference.solvers.fenicsx.linear import LinearSolveError, fgmres, iterate
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
@@ -23,9 +23,9 @@ _STALE = 15
 
 
 class Multigrid:
-    """Solves with the matrix of a ``system`` on one rank, whose ``element`` is quadratic and has a pressure."""
+    """Solves with the matrix of a ``system`` on one rank, whose element is quadratic and has a pressure."""
 
-    def __init__(self, system: System, element: str, spent: Spent) -> None:
+    def __init__(self, system: System, spent: Spent) -> None:
         self.system, self.matrix, self.spent = system, system.matrix, spent
         cells = system.cells
         displaced = np.unique(cells.unknowns[:, : 3 * cells.nodes])
@@ -33,25 +33,19 @@ class Multigrid:
         self.sets = [PETSc.IS().createGeneral(names.tolist()) for names in (displaced, pressures)]
         self.number = np.zeros(system.size, np.int64)  # of an unknown in its block
         self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
-        self.coarse, self.fixed = self._interpolation(element, displaced.astype(np.int64))
+        self.coarse, self.fixed = self._interpolation(displaced.astype(np.int64))
         self.blocks = _Blocks(self.sets)
-        self.krylov = PETSc.KSP().create(self.matrix.comm)
-        self.krylov.setType("fgmres")
-        self.krylov.setGMRESRestart(_MOST)
-        self.krylov.setOperators(self.matrix, self.matrix)
+        self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.getPC().setType("python")
         self.krylov.getPC().setPythonContext(self.blocks)
         self.stale, self.first = True, 0
-
-    def changed(self) -> None:
-        """Note that the matrix has changed; the preconditioner remains in use."""
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
         fresh = self.stale
         if fresh:
             self._renew()
-        if self._iterate(b, x, tolerance):
+        if iterate(self.krylov, b, x, tolerance, _MOST, self.spent):
             iterations = self.krylov.getIterationNumber()
             per_digit = iterations / -np.log10(tolerance)
             self.first = per_digit if fresh else self.first
@@ -59,19 +53,12 @@ class Multigrid:
             return
         if not fresh:
             self._renew()
-        if fresh or not self._iterate(b, x, tolerance):
+        if fresh or not iterate(self.krylov, b, x, tolerance, _MOST, self.spent):
             raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
 
     def solve_exactly(self) -> bool:
         """False: memory does not suffice for a factorisation."""
         return False
-
-    def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> bool:
-        with self.spent.on("krylov"):
-            self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST)
-            self.krylov.solve(b, x)
-        self.spent.counts["krylov_iterations"] += self.krylov.getIterationNumber()
-        return bool(self.krylov.is_converged)
 
     def _renew(self) -> None:
         """Build the preconditioner of the present matrix."""
@@ -105,34 +92,20 @@ class Multigrid:
         cycle.setUp()
         return cycle
 
-    def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
-        """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the
-        unknowns of the linear element that are free: those at corners where one of the quadratic element is.
+    def _interpolation(self, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
+        """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the unknowns
+        of the linear element that are fixed: those at corners where the quadratic one is.
         """
-        cells, system = self.system.cells, self.system
-        kind, degree, _ = ELEMENTS[element]
-        cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped
-        places = basix.create_element(basix.ElementFamily.P, cell, degree, warped).points
-        shares = basix.create_element(basix.ElementFamily.P, cell, 1, warped).tabulate(0, places)[0, :, :, 0]
-        corners = cells.mesh.geometry.dofmap[: cells.count, : shares.shape[1]]
-        _, corner = np.unique(corners, return_inverse=True)
-        corner = corner.reshape(corners.shape)
-        node, vertex = np.nonzero(np.abs(shares) > 1e-12)
-        parts = []
-        for i in range(3):
-            rows = self.number[cells.unknowns[:, i * cells.nodes + node]]
-            parts.append((rows.ravel(), (3 * corner[:, vertex] + i).ravel()))
-        rows, columns = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-        values = np.tile(np.tile(shares[node, vertex], cells.count), 3)
-        _, once = np.unique(rows * (3 * corner.max() + 3) + columns, return_index=True)
-        rows, columns, values = rows[once], columns[once], values[once]
-        prescribed = system.fixed[displaced]
-        fixed = np.unique(columns[(values > 1 - 1e-12) & prescribed[rows]])
-        gone = prescribed[rows] | np.isin(columns, fixed)
-        shape = (len(displaced), int(3 * corner.max() + 3))
-        found = csr_array(coo_array((np.where(gone, 0.0, values), (rows, columns)), shape=shape))
-        csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
-        return PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm), fixed
+        space, parents = self.system.unknowns.function_space.sub(0).collapse()
+        corners = interpolation_matrix(fem.functionspace(space.mesh, ("Lagrange", 1, (3,))), space)
+        corners.assemble()
+        starts, columns, shares = corners.getValuesCSR()
+        order = np.argsort(self.number[np.ravel(parents)])
+        found = csr_array((shares, columns, starts), shape=corners.getSize())[order].tocoo()
+        prescribed = self.system.fixed[displaced][found.row]
+        fixed = np.unique(found.col[(found.data > 1 - 1e-12) & prescribed])
+        found.data[prescribed | np.isin(found.col, fixed) | (np.abs(found.data) < 1e-12)] = 0.0
+        return self._matrix(csr_array(found)), fixed
 
     def _mass(self) -> PETSc.PC:
         """The mass matrix of the pressure over local stiffness, solved by a factorisation."""
@@ -141,15 +114,18 @@ class Multigrid:
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]
         rows, columns = np.repeat(names, names.shape[1], axis=1), np.tile(names, (1, names.shape[1]))
         size = self.sets[1].getSize()
-        found = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
-        csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
-        mass = PETSc.Mat().createAIJ((size, size), csr=csr, comm=self.matrix.comm)
+        mass = self._matrix(csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
         solver = PETSc.PC().create(self.matrix.comm)
         solver.setOperators(mass, mass)
         solver.setType("cholesky")
         solver.setFactorSolverType("mumps")
         solver.setUp()
         return solver
+
+    def _matrix(self, found: csr_array) -> PETSc.Mat:
+        found.sum_duplicates()
+        csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
+        return PETSc.Mat().createAIJ(found.shape, csr=csr, comm=self.matrix.comm)
 
 
 class _Blocks:

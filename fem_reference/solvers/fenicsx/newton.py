@@ -110,7 +110,6 @@ class Newton:
 
     def _linearise(self, moves: Floats | None = None, tractions: Tractions | None = None) -> float:
         moves = -self.system.missing() if moves is None else moves
-        self.linear.changed()
         return self.system.linearise(moves if moves.any() else None, tractions)
 
     def _meet(self, frame: float) -> None:

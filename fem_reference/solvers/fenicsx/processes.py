@@ -1,21 +1,24 @@
-"""The worker processes of FEniCSx: installation check, a running process, its events and its outcome."""
+"""The worker processes of FEniCSx: installation check, command line, and a running process with its reports and time limits."""
 
 import importlib.util
-import json
+import os
+import pickle
 import re
+import shutil
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from pathlib import Path
 
-from fem_reference.foundations.errors import MissingSoftware
-from fem_reference.foundations.subprocesses import environment
+from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.foundations.usage import processor_times
 from fem_reference.runs.contents import Status
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Sink
 
 # One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless set otherwise.
 _SETTINGS = {
@@ -25,12 +28,14 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
+# Ranks that any machine accepts; more only where there are as many cores.
+_MOST_RANKS = 8
 PATIENCE = 5.0  # [s] from the request to end a process until it is killed
 # Clock time that may pass, as a multiple of a limit of processor time and of the start-up: beyond it the machine is too busy
 # for any conclusion.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s]
-MARK = "@fem_reference "  # begins each line of the worker's output that is meant for the caller
+MARK = "@fem_reference "  # begins each line of output that names a file with a pickled frame or outcome
 
 
 def installed() -> bool:
@@ -46,50 +51,80 @@ def require_installed() -> None:
         )
 
 
-class Process:
-    """A running ``process``; its error output is read continuously."""
+def mpiexec() -> str | None:
+    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, which may not fit; None where there is none."""
+    beside = Path(sys.executable).with_name("mpiexec")
+    return str(beside) if beside.exists() else shutil.which("mpiexec")
 
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        self.process = process
+
+def command_line(ranks: int) -> list[str]:
+    """The worker's command line. InputError for more ranks than the machine takes, MissingSoftware without ``mpiexec``."""
+    # mpi4py's own runner ends all ranks after an error on one; without it the others wait forever.
+    worker, runner = command("-m", "mpi4py", "-m", f"{__package__}.worker"), mpiexec()
+    if ranks == 1:
+        return worker
+    if ranks > (most := max(_MOST_RANKS, os.cpu_count() or 1)):
+        raise InputError("ranks", ranks, f"at most {most} on this machine")
+    if runner is None:
+        raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither beside {sys.executable} nor on the PATH")
+    return [runner, "-n", str(ranks), *worker]
+
+
+class Process:
+    """A process that ``words`` start. It reads the names of job files, one a line; its error output is read continuously."""
+
+    def __init__(self, words: list[str]) -> None:
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(
+            words, stdin=pipe, stdout=pipe, stderr=pipe, text=True, errors="replace", env=environment(**_SETTINGS)
+        )
+        streams = self.process.stdin, self.process.stdout, self.process.stderr
+        self.input, self.output, self.error_output = (stream for stream in streams if stream)  # each is a pipe
         self.overran: tuple[Status, str] | None = None  # the reason where a time limit ended it
         self.errors: list[str] = []
         self.listener = threading.Thread(target=self._listen)
         self.listener.start()
 
     def _listen(self) -> None:
-        assert self.process.stderr is not None
-        self.errors.extend(line for line in self.process.stderr if line.strip())
+        self.errors.extend(line for line in self.error_output if line.strip())
 
-    def events(self) -> Iterator[dict[str, Any]]:
-        """The reported events, until its output ends."""
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if line.startswith(MARK):
-                yield json.loads(line.removeprefix(MARK))
-
-    def ending(self, kept: str) -> Outcome:
-        """The outcome where it ended without a report; ``kept`` states what remains nevertheless."""
-        code = self.process.wait()
+    def solve(self, job: Path, time_limit: float | None, sink: Sink) -> Outcome:
+        """Solve the job in a file and sink each frame. The outcome of a process that dies is *crashed*; of one over the time limit,
+        which is ended, *timed out* or *stalled*.
+        """
+        kept = "no frame was reached"
+        with self._limited(time_limit):
+            with suppress(BrokenPipeError):  # a dead process does not read it, and its exit status shows that
+                self.input.write(f"{job}\n")
+                self.input.flush()
+            for report in self._reports():
+                if isinstance(report, Outcome):
+                    return report
+                sink(report)
+                kept = f"frames up to {report.number:g} are kept"
+            code = self.process.wait()
         self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:
             status, why = self.overran
             return Outcome(status, f"{why}; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
+    def _reports(self) -> Iterator[Frame | Outcome]:
+        """The frames and the outcome that it reports, until its output ends."""
+        for line in self.output:
+            if line.startswith(MARK):
+                path = Path(line.removeprefix(MARK).rstrip("\n"))
+                report = pickle.loads(path.read_bytes())
+                path.unlink()
+                yield report
+
     def _reason(self) -> str:
         """The most informative line of its error output: the last that names an error, else the last."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a word"])[-1].strip()
 
-    def feed(self, line: str) -> None:
-        """Write a line to its standard input; a dead process does not read it, and its exit status shows that."""
-        assert self.process.stdin is not None
-        with suppress(BrokenPipeError):
-            self.process.stdin.write(f"{line}\n")
-            self.process.stdin.flush()
-
     @contextmanager
-    def limited(self, time_limit: float | None) -> Iterator[None]:
+    def _limited(self, time_limit: float | None) -> Iterator[None]:
         """End it where one of its processes meanwhile takes more than ``time_limit`` [s] of processor time, independent of other
         load on the machine. ``CLOCK`` times that by the clock ends it too, without a conclusion about the work.
         """
@@ -108,22 +143,24 @@ class Process:
     def _watch(self, time_limit: float, done: threading.Event) -> None:
         begin, before = time.monotonic(), processor_times(self.process.pid)
         longest = CLOCK * (_START + time_limit)
-        while True:
+        while self.overran is None:
             passed = time.monotonic() - begin
             now = processor_times(self.process.pid) if before else {0: passed}
             used = max((seconds - before.get(number, 0.0) for number, seconds in now.items()), default=0.0)
             if used >= time_limit:
                 self.overran = "timed out", f"stopped after {time_limit:g} s of processor time, the time limit"
-                break
-            if passed >= longest:
-                self.overran = "stalled", _stalled(passed, used, time_limit)
-                break
-            if done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):
+            elif passed >= longest:
+                why = (
+                    f"stopped after {passed:.3g} s in which it had {used:.3g} s of processor time, of the {time_limit:g} s that "
+                    "it may take: the machine was busy, or something waited; that says nothing of what was solved"
+                )
+                self.overran = "stalled", why
+            elif done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):
                 return
-        self.end()
+        self._stop()
 
-    def end(self) -> None:
-        """End it: ask repeatedly, as mpiexec ignores a signal before its own processes start; kill it in the end."""
+    def _stop(self) -> None:
+        """Ask it repeatedly to end, as mpiexec ignores a signal before its own processes start; kill it in the end."""
         asked = time.monotonic()
         while self.process.poll() is None:
             patient = time.monotonic() - asked < PATIENCE
@@ -131,37 +168,16 @@ class Process:
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=0.5)
 
+    def finish(self) -> None:
+        """Let it end by itself, as there are no more jobs."""
+        with suppress(BrokenPipeError):
+            self.input.close()
+        self.process.wait()
 
-def _stalled(passed: float, used: float, time_limit: float) -> str:
-    return (
-        f"stopped after {passed:.3g} s in which it had {used:.3g} s of processor time, of the {time_limit:g} s that it may take: "
-        "the machine was busy, or something waited; that says nothing of what was solved"
-    )
-
-
-@contextmanager
-def running(command_line: list[str], time_limit: float | None, *, fed: bool = False) -> Iterator[Process]:
-    """The process that ``command_line`` starts, ended on exit. A ``fed`` process reads lines from the caller until then."""
-    process = subprocess.Popen(
-        command_line,
-        stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        env=environment(**_SETTINGS),
-    )
-    started = Process(process)
-    try:
-        with started.limited(time_limit):
-            yield started
-            if process.stdin is not None:
-                with suppress(BrokenPipeError):
-                    process.stdin.close()
-            process.wait()
-    finally:
-        started.end()
-        started.listener.join()
-        for stream in (process.stdin, process.stdout, process.stderr):
-            if stream is not None:
+    def end(self) -> None:
+        """End it, whatever it does."""
+        self._stop()
+        self.listener.join()
+        for stream in (self.input, self.output, self.error_output):
+            with suppress(BrokenPipeError):
                 stream.close()

@@ -1,31 +1,32 @@
-"""One FEniCSx process that solves bodies one after the other, and reuses what it has compiled and loaded."""
+"""Sessions: one FEniCSx process that solves problem after problem, and reuses what it has compiled and loaded."""
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cloudpickle
 import numpy as np
 
 from fem_reference.foundations import scratch
-from fem_reference.foundations.subprocesses import command
 from fem_reference.problems.body import Body, check_quadrature
 from fem_reference.problems.checks import check
+from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
-from fem_reference.solvers.fenicsx.jobs import Job, stored_state
-from fem_reference.solvers.fenicsx.processes import Process, installed, require_installed, running
-from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.common.protocol import solved
+from fem_reference.solvers.fenicsx.jobs import Job
+from fem_reference.solvers.fenicsx.processes import Process, command_line, installed, require_installed
+from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves bodies in a subprocess of its own, which is restarted after it died."""
+    """Solves problems on ``ranks`` in a subprocess of its own, which is restarted after it died; jobs and frames are passed in a
+    ``folder``.
+    """
 
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
-        """``folder``: for jobs and states; ``stack`` ends the processes."""
-        self.folder, self.stack = folder, stack
+    def __init__(self, folder: Path, ranks: int) -> None:
+        self.folder, self.ranks = folder.resolve(), ranks  # the process may have been started elsewhere
         self.process: Process | None = None
         self.closed = False
 
@@ -36,100 +37,45 @@ class Session:
         return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-        """Pass the frames of ``body`` to ``sink``. A process that dies is the status *crashed*, and one over the time limit is
-        ended and *timed out* or *stalled*, not an exception. RuntimeError once the session is closed.
+        """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
+        check(body, settings.element)
+        check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
+        return self.run(Job(body, settings), settings.time_limit, sink)
+
+    def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
+        """Solve the ``job`` and sink each frame. A process that dies is the status *crashed*, and one over the time limit is ended
+        and *timed out* or *stalled*, not an exception. RuntimeError once the session is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
-        check(body, settings.element)
-        check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
-        job = self.folder / "job.pickle"
-        job.write_bytes(cloudpickle.dumps(Job(body, settings)))
-        return self.run(job, settings.time_limit, lambda event: sink(_state(event)), "states")
-
-    def run(self, job: Path, time_limit: float | None, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
-        """Solve the ``job`` in a file and pass each reported frame to ``sink``; ``kept`` names what remains of them."""
-        if self.process is None:
-            self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
+        path = self.folder / "job.pickle"
+        path.write_bytes(cloudpickle.dumps(job))
+        process = self.process = self.process or Process(command_line(self.ranks))
+        lasts = False
         try:
-            with self.process.limited(time_limit):
-                outcome = _followed(self.process, job, sink, kept)
-        except BaseException:  # later reports on this job must not reach the next
-            self.process.end()
-            self.process = None
-            raise
-        if self.process.overran is not None or outcome.status == "crashed":
-            self.process = None
+            outcome = process.solve(path, time_limit, sink)
+            lasts = process.overran is None and outcome.status != "crashed"
+        finally:
+            if not lasts:  # later reports on this job must not reach the next
+                self.process = None
+                process.end()
         return outcome
 
 
-_WORKER = "fem_reference.solvers.fenicsx.worker"
-
-
-def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
-    """The outcome of the ``job`` in ``process``."""
-    process.feed(str(job))
-    count = 0
-    for event in process.events():
-        if "frame" not in event:
-            return Outcome(event["status"], event["message"], event["cost"])
-        sink(event)
-        count += 1
-    return process.ending(f"{count} {kept} are kept")
-
-
-def _state(event: dict[str, Any]) -> Frame:
-    path = Path(event["file"])
-    with np.load(path, allow_pickle=False) as arrays:
-        forces, moments = (
-            {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
-            for kind in ("force ", "moment ")
-        )
-        state = Frame(
-            event["frame"],
-            points=arrays["nodes"],
-            scalars=event["scalars"],
-            state=stored_state(arrays),
-            forces=forces,
-            moments=moments,
-            residuals=tuple(event["residuals"]),
-        )
-    path.unlink()
-    return state
-
-
 @contextmanager
-def session() -> Iterator[Session]:
+def session(ranks: int = 1) -> Iterator[Session]:
     """A session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
-    with scratch.folder() as folder, ExitStack() as stack:
-        own = Session(folder, stack)
+    with scratch.folder() as folder:
+        own = Session(folder, ranks)
         try:
             yield own
+            if own.process:
+                own.process.finish()
         finally:
             own.closed = True
-
-
-@contextmanager
-def _opened() -> Iterator[Session]:
-    """The shared session, or else a new one."""
-    if (shared_now := present()) is not None:
-        yield shared_now
-    else:
-        with session() as own:
-            yield own
-
-
-def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-    """Pass the frames of ``body`` to ``sink``, by the shared session or by a new one."""
-    with _opened() as solver:
-        return solver.follow(body, settings, sink)
-
-
-def solve_body(body: Body, settings: BodySettings) -> Run:
-    """The run of ``body``, in memory, by the shared session or by a new one."""
-    with _opened() as solver:
-        return solver.solve(body, settings)
+            if own.process:
+                own.process.end()
 
 
 _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
@@ -140,7 +86,7 @@ def shared() -> Iterator[None]:
     """Meanwhile all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already shared
     process remains in use. Without FEniCSx nothing is solved and nothing shared.
     """
-    with session() if installed() and present() is None else nullcontext(present()) as own:
+    with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)
         try:
             yield
@@ -148,6 +94,35 @@ def shared() -> Iterator[None]:
             _shared.reset(before)
 
 
-def present() -> Session | None:
-    """The shared session, None where there is none."""
-    return _shared.get()
+def opened(ranks: int = 1) -> AbstractContextManager[Session]:
+    """The shared session, for one rank where there is one, else a new one. MissingSoftware where FEniCSx is not installed."""
+    require_installed()
+    common = _shared.get() if ranks == 1 else None
+    return nullcontext(common) if common else session(ranks)
+
+
+def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
+    """Pass the frames of ``body`` to ``sink``, by the shared session or by a new one."""
+    with opened() as solver:
+        return solver.follow(body, settings, sink)
+
+
+def solve_body(body: Body, settings: BodySettings) -> Run:
+    """The run of ``body``, in memory, by the shared session or by a new one."""
+    with opened() as solver:
+        return solver.solve(body, settings)
+
+
+def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
+    """Sink a scalar field, by the shared session or by a new one; not-a-number where the process died."""
+    frames: list[Frame] = []
+    with opened() as solver:
+        outcome = solver.run(problem, settings.time_limit, frames.append)
+    lost = Frame.of_field(problem, np.full(len(problem.fixed), np.nan), problem.form)
+    sink(frames[0] if frames else lost)
+    return outcome
+
+
+def solve_field(problem: FieldProblem, settings: FieldSettings) -> Run:
+    """The run of a scalar field, in memory."""
+    return solved(solve_scalar, problem, settings)

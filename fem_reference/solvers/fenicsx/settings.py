@@ -54,3 +54,9 @@ class Settings(BodySettings):
     """
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
+
+
+class FieldSettings(Record):
+    """Settings of scalar fields. ``time_limit``: processor time after which to give up, by default none."""
+
+    time_limit: Time | None = None

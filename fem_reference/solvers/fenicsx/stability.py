@@ -2,52 +2,16 @@
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
-from petsc4py import PETSc
 
 from fem_reference.effects import Load
-from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
-from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, LinearSolver
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.system import System
-
-_ITERATIONS = 40  # of inverse iteration
 
 
 def has_energy(body: Body) -> bool:
     """True where all effects on ``body`` have an energy, so that its tangent is symmetric; loads may have none."""
     return not any(isinstance(effect, Load) for effect in body.effects)
-
-
-def softest(linear: LinearSolver, system: System, displacement: Ints) -> PETSc.Vec:
-    """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
-
-    Inverse iteration from a random start; ``displacement``: the unknowns that have a mass. ``LinearSolveError`` where no unknown
-    is free to move.
-    """
-    comm, moves = system.unknowns.function_space.mesh.comm, np.zeros(system.size)
-    moves[displacement.ravel()] = 1.0
-    moves[system.fixed] = 0.0
-    moves = moves[: system.owned]
-    if not comm.allreduce(moves.any(), MPI.LOR):
-        raise LinearSolveError("nothing is left to move")
-    vector: PETSc.Vec = system.b.duplicate()
-    image: PETSc.Vec = system.b.duplicate()
-    image.array[:] = moves * np.random.default_rng(comm.rank).normal(size=len(moves))
-    for _ in range(_ITERATIONS):
-        vector.array[:] = image.array * moves
-        vector.normalize()
-        linear.solve(vector, image, 1e-10)
-    vector.array[:] = image.array * moves
-    image.scale(float(vector.dot(vector)) ** -0.5)
-    return image
-
-
-def displacements(mode: PETSc.Vec, system: System, displacement: Ints) -> Floats:
-    """The displacements (n, 3) of the nodes of this rank in a ``mode``, whose unknowns are ``displacement`` (n, 3)."""
-    found: Floats = np.zeros(system.size)
-    found[: system.owned] = mode.array
-    return found[displacement]
 
 
 class Stability:
@@ -79,7 +43,6 @@ class Stability:
 
     def _counted(self, *, pointwise: bool = False) -> float:
         self.system.linearise(pointwise=pointwise)
-        self.linear.changed()
         try:
             return float(self.linear.negative_pivots() - self.pressures)
         except LinearSolveError:

@@ -187,3 +187,22 @@ class SurfaceSums:
         self.matrix.data[:] = 0
         fem.assemble_matrix(self.matrix, self.slope)
         np.add.at(entries, self.places, self.matrix.data)
+
+
+def reactions(
+    system: System, contact: ContactForces | None, *, divided: bool
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """The force (3,) [N] of each constraint in a ``system`` and of each bone in ``contact``, by name, on the body, and its moment
+    (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
+    balance, or counts in each.
+    """
+    residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
+    shared = np.zeros(len(now), np.int64)
+    for one in system.conditions:
+        if divided and isinstance(one, PrescribedRegion):
+            shared[one.dofs] += 1
+    found = {one.entry.name: one.force(residual, now, shared) for one in system.conditions}
+    found |= contact.forces() if contact else {}
+    forces = {name: comm.allreduce(force, MPI.SUM) for name, (force, _) in found.items()}
+    moments = {name: comm.allreduce(moment, MPI.SUM) for name, (_, moment) in found.items()}
+    return forces, moments

@@ -12,7 +12,7 @@ from fem_reference.problems.scalar import FieldProblem, Flux, build
 from fem_reference.runs.store import Run
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import FieldSettings
-from tests.solvers.fenicsx.test_field import resonant
+from tests.solvers.fenicsx.test_session import resonant
 
 pytestmark = [
     pytest.mark.slow,

@@ -7,11 +7,12 @@ import pytest
 import shapes
 
 from fem_reference import effects
+from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import TetMesh
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
-from fem_reference.solvers.fenicsx import Settings
+from fem_reference.solvers.fenicsx import Settings, processes
 from validation.torsion import square_bar_stiffness
 
 pytestmark = pytest.mark.slow
@@ -138,9 +139,9 @@ def test_missing_software_is_named(bent, monkeypatch) -> None:
     problem, *_ = bent
     with monkeypatch.context() as without:
         without.setattr("importlib.util.find_spec", lambda _: None)
-        with pytest.raises(fenicsx.MissingSoftware, match=r"pip install 'fem_reference\[fenicsx\]'"):
+        with pytest.raises(MissingSoftware, match=r"pip install 'fem_reference\[fenicsx\]'"):
             solved(problem)
-    monkeypatch.setattr(fenicsx.shutil, "which", lambda _: None)
-    monkeypatch.setattr(fenicsx.sys, "executable", "/nowhere/python")
-    with pytest.raises(fenicsx.MissingSoftware, match="3 ranks need mpiexec"):
+    monkeypatch.setattr(processes.shutil, "which", lambda _: None)
+    monkeypatch.setattr(processes.sys, "executable", "/nowhere/python")
+    with pytest.raises(MissingSoftware, match="3 ranks need mpiexec"):
         fenicsx.require(Settings(ranks=3))

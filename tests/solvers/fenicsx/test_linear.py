@@ -1,4 +1,4 @@
-"""Matrices and paths at the edge: single precision that does not resolve the softest direction, limit points that are not near."""
+"""Single precision that does not resolve the softest direction of a matrix is replaced by double precision."""
 
 import numpy as np
 import pytest

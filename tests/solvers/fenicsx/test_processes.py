@@ -1,6 +1,6 @@
 """Worker processes: how they end, by themselves, at a time limit, or when interrupted."""
 
-import json
+import pickle
 import shutil
 import signal
 import sys
@@ -9,19 +9,27 @@ from pathlib import Path
 
 import pytest
 
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers.fenicsx import processes
-from fem_reference.solvers.fenicsx.processes import MARK, running
+from fem_reference.solvers.fenicsx.processes import MARK, Process
 
 pytestmark = pytest.mark.slow
 
 
-def outcome_of(command: list[str], time_limit: float | None = None) -> Outcome:
-    """How a process ends: as it reports, or as it is found."""
-    with running(command, time_limit) as worker:
-        for event in worker.events():
-            return Outcome(**event)
-        return worker.ending("no frame was reached")
+def outcome_of(words: list[str], time_limit: float | None = None) -> Outcome:
+    """The end of a process: as it reports, or as it is found."""
+    started = Process(words)
+    try:
+        return started.solve(Path("job.pickle"), time_limit, lambda _: None)
+    finally:
+        started.end()
+
+
+def reported(tmp_path: Path, report: Frame | Outcome) -> str:
+    """The line by which a process reports."""
+    path = tmp_path / "report.pickle"
+    path.write_bytes(pickle.dumps(report))
+    return f"{MARK}{path}"
 
 
 def two_ranks(program) -> list[str]:
@@ -62,10 +70,10 @@ def test_a_time_limit_is_of_each_process(tmp_path) -> None:
     assert outcome.status == "timed out"
 
 
-def test_a_machine_that_is_busy_is_no_time_limit(monkeypatch) -> None:
+def test_a_machine_that_is_busy_is_no_time_limit(tmp_path, monkeypatch) -> None:
     """A process that waits for three times its limit, as one does that gets no processor, goes on; at last it says nothing."""
-    report = json.dumps({"status": "converged", "message": "done", "cost": {}})
-    waits = f"import time; time.sleep(1.5); print({MARK + report!r}, flush=True)"
+    line = reported(tmp_path, Outcome("converged", "done"))
+    waits = f"import time; time.sleep(1.5); print({line!r}, flush=True)"
     outcome = outcome_of([sys.executable, "-c", waits], 0.5)
     assert outcome.status == "converged"
     monkeypatch.setattr(processes, "CLOCK", 0.5)
@@ -78,38 +86,38 @@ def test_a_machine_that_is_busy_is_no_time_limit(monkeypatch) -> None:
 def test_an_interrupt_right_after_the_start_ends_all_ranks(tmp_path) -> None:
     (tmp_path / "sleep.py").write_text("import time; time.sleep(60)")
     begin = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt), running(two_ranks(tmp_path / "sleep.py"), None) as started:
-        raise KeyboardInterrupt  # mpiexec has no processes yet, and ignores what comes before them
+    started = Process(two_ranks(tmp_path / "sleep.py"))
+    started.end()  # mpiexec has no processes yet, and ignores what comes before them
     assert started.process.returncode != 0
     assert time.perf_counter() - begin < 20
 
 
 @pytest.fixture
-def deaf(monkeypatch):
-    """The command line of a process that does not listen to signals, once it has reported 1."""
+def deaf(tmp_path, monkeypatch):
+    """A process that does not listen to signals, once it has reported a frame."""
     monkeypatch.setattr(processes, "PATIENCE", 0.3)
     ignore = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN)"
-    return [sys.executable, "-c", f"{ignore}; print({MARK!r} + '1', flush=True)\nwhile True: pass"]
+    line = reported(tmp_path, Frame(1))
+    started = Process([sys.executable, "-c", f"{ignore}; print({line!r}, flush=True)\nwhile True: pass"])
+    yield started
+    assert started.process.returncode == -signal.SIGKILL
 
 
 def test_an_interrupt_kills_a_process_that_does_not_listen(deaf) -> None:
-    def interrupt(started) -> None:
-        next(started.events())
+    def interrupt(_: Frame) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), running(deaf, None) as started:
-        interrupt(started)
-    assert started.process.returncode == -signal.SIGKILL
+    with pytest.raises(KeyboardInterrupt):
+        deaf.solve(Path("job.pickle"), None, interrupt)
+    deaf.end()
 
 
 def test_a_time_limit_kills_a_process_that_does_not_listen(deaf) -> None:
-    with running(deaf, None) as started:
-        assert next(started.events()) == 1
-        with started.limited(0.2):
-            assert list(started.events()) == []
-        ended = started.ending("nothing is kept")
+    frames: list[Frame] = []
+    ended = deaf.solve(Path("job.pickle"), 0.2, frames.append)
+    deaf.end()
+    assert [frame.number for frame in frames] == [1]
     assert (ended.status, ended.message) == (
         "timed out",
-        "stopped after 0.2 s of processor time, the time limit; nothing is kept",
+        "stopped after 0.2 s of processor time, the time limit; frames up to 1 are kept",
     )
-    assert started.process.returncode == -signal.SIGKILL

@@ -1,55 +1,30 @@
-"""The attached part of a muscle: vertices of its surface, and boundary triangles of the tetrahedra below them."""
+"""The attachments and the fibres of a muscle, as its case gives them."""
 
+import logging
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.foundations.records import join
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
 from fem_reference.geometry.patches import draped, fan
 from fem_reference.geometry.sectors import shares_at
+from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.io import files
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
-_SAMPLES = np.array(
-    [
-        [1 / 3, 1 / 3, 1 / 3],
-        [0.6, 0.2, 0.2],
-        [0.2, 0.6, 0.2],
-        [0.2, 0.2, 0.6],
-        [0.45, 0.45, 0.1],
-        [0.45, 0.1, 0.45],
-        [0.1, 0.45, 0.45],
-    ]
-)
+_SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices of a muscle that an attachment of a case selects.
-
-    Parameters
-    ----------
-    case, i
-        The selection is that of ``scene.attachment[i]``.
-    surface
-        The surface of the muscle.
-    bone_surface
-        The surface of the attachment's bone.
-
-    Returns
-    -------
-    array (k,)
-        Indices of vertices of ``surface``, sorted.
-
-    Raises
-    ------
-    InputError
-            Names the unusable key of the case, or the file and row (comment lines not counted).
-
+    """The vertices (k,) of the muscle's ``surface``, sorted, that ``case.attachment[i]`` selects, with its ``bone_surface``;
+    InputError names the unusable key of the case, or the file and row (comment lines not counted).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -66,22 +41,9 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The facets of a mesh that lie under the attached part of a surface, although they do not follow its rim.
-
-    Parameters
-    ----------
-    mesh
-        Tetrahedra inside ``surface``.
-    surface
-        The surface that the attachment is defined on.
-    shares
-        Attached shares (k, 3) of the corners of the triangles of ``surface``.
-
-    Returns
-    -------
-    array (m, 3)
-        Boundary triangles of ``mesh``, outward, whose attached share, averaged over seven samples, is above a half.
-
+    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part, although they do
+    not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): those of the
+    corners of the triangles of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -124,16 +86,16 @@ def _quoted(text: str) -> str:
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
     """The patches spanned by the clouds of an outline, as one surface [mm]; ``place`` is the key of the clouds."""
     clouds = _clouds(path, outline.unit)
-    points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    patches = []
     for name in outline.clouds:
         if name not in clouds:
             raise InputError(place, f'"{name}", which {path} does not have', f"some of {', '.join(sorted(clouds))}")
         if len(clouds[name]) < 3:
             raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
-        spanned = fan(np.array(clouds[name]))
-        triangles = np.concatenate([triangles, spanned.triangles + len(points)])
-        points = np.concatenate([points, spanned.points])
-    return Surface(points, triangles, str(path))
+        patches.append(fan(np.array(clouds[name])))
+    starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
+    triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
+    return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
 
 
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
@@ -149,3 +111,54 @@ def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
             raise InputError(f"{path}: row {number}", f'"{",".join(row)}"', "cloud, landmark and three coordinates")
         clouds.setdefault(cloud, []).append([x, y, z])
     return clouds
+
+
+log = logging.getLogger(__name__)
+
+# Fibres are traced in a separate mesh of about this many tets.
+TETS = 8000
+
+
+def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
+    """The fibres of a case, and their direction at any point. They are given as polylines, with the direction of the nearest, or
+    traced in tetrahedra of a size [mm] with which ``fill`` fills the closed ``surface`` of the muscle.
+    """
+    if (lines := _given(case)) is not None:
+        return inside(surface, lines), NearestLine(lines)
+    traced = case.fibres.traced
+    assert traced is not None  # a Fibres record has one of the two
+    volume = enclosed_volume(surface.points, surface.triangles)
+    mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
+    field = fibre_field(mesh, traced.start, traced.end)
+    return trace(field, traced.count), field
+
+
+def lean(case: MuscleCase, axis: Floats) -> float:
+    """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
+    it. It is the shear by their tension. 0 for fibres that are traced from one attachment to the other.
+    """
+    if (lines := _given(case)) is None:
+        return 0.0
+    pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)
+    lengths, along = np.linalg.norm(pieces, axis=1), np.abs(pieces @ axis)
+    cosine = along / np.maximum(lengths, np.finfo(float).tiny)
+    return float(np.sqrt((4 * cosine**2 * np.maximum(1 - cosine**2, 0)) @ lengths / lengths.sum()))
+
+
+def _given(case: MuscleCase) -> Polylines | None:
+    given = case.fibres.polylines
+    if given is None:
+        return None
+    return files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
+
+
+def inside(surface: Surface, fibres: Polylines) -> Polylines:
+    """The fibres with each point outside the ``surface`` moved to its nearest point, as there is no solution outside."""
+    away = signed_distances(fibres.points, surface)
+    points = np.array(fibres.points)
+    points[away > 0] = distances(points[away > 0], surface).closest
+    if away.max() > 0:
+        log.info(
+            "fibres: %d of %d points moved into the muscle, by up to %.1f mm", (away > 0).sum(), len(points), away.max()
+        )
+    return Polylines(points, fibres.offsets)

@@ -1,4 +1,4 @@
-"""Limit points: foreseen where they are near, and claimed nowhere else."""
+"""Limit points are foreseen where they are near, and claimed nowhere else; an unstable equilibrium is left where that is wanted."""
 
 from dataclasses import replace
 
@@ -11,12 +11,12 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
-from fem_reference.solvers.fenicsx import BodySettings, limit_points
+from fem_reference.solvers.fenicsx import BodySettings, modes
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.verification import parts
+from tests.solvers.fenicsx.test_stability import THIN, column, critical, flesh, session  # noqa: F401 - a fixture
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:(cmap|dofmap) is deprecated")]
-
 
 STILL = ((0.0, 0.0, 0.0),) * 3
 
@@ -34,11 +34,28 @@ def test_a_limit_point_is_claimed_within_four_of_the_smallest_steps_only() -> No
     built = AssembledBody(body, BodySettings(element="P2/P1", first_step=0.1, residual=1e-10))
     for frame in (0.1, 0.2, 0.24):
         assert built.attempt(frame).converged
-    far = limit_points.ahead(built, 0.05)
+    far = modes.ahead(built, 0.05)
     assert far is not None
     left = far.frame - built.at
     assert 0 < left < 0.05
-    near = limit_points.ahead(built, left / 3.5)
+    near = modes.ahead(built, left / 3.5)
     assert near is not None
     assert near.frame - built.at == pytest.approx(left, rel=0.05)  # its slope is taken over a shorter way
-    assert limit_points.ahead(built, left / 5) is None
+    assert modes.ahead(built, left / 5) is None
+
+
+def test_a_column_leaves_the_straight_state_where_it_is_unstable(session) -> None:  # noqa: F811
+    body = column("Q2/Q1", (1, 1, 10), [0.97 * critical(THIN), 1.1 * critical(THIN)])
+    straight, bent = (
+        session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0, follow=follow))
+        for follow in ("equilibrium", "stable")
+    )
+    assert [state.scalars["negative_modes"] for state in straight.states] == [0, 0, 1]
+    assert [state.scalars["negative_modes"] for state in bent.states] == [0, 0, 0]
+    assert bent.last.scalars["energy"] < straight.last.scalars["energy"]
+    aside = [np.ptp(solved.last.points[:, 0]) for solved in (straight, bent)]
+    assert aside[1] > 1.2 * aside[0]
+    assert (
+        "in 1 of them an unstable equilibrium was left along its lowest mode, first at frame 2" in bent.outcome.message
+    )
+    assert "unstable" in straight.outcome.message

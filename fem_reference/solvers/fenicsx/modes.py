@@ -1,0 +1,202 @@
+"""The softest mode of a body: departures along it from an unstable equilibrium, and limit points at which its stiffness is 0.
+
+At a limit point a path of equilibria turns back in time, with no state near beyond.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fem_reference.foundations.mesh import Floats, diagonal, place_of
+from fem_reference.solvers.fenicsx.body import AssembledBody
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, LinearSolver
+
+_ITERATIONS = 40  # of inverse iteration
+_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn where the state returns or no solution is found
+_SHIFT, _GROWTH = 1e-6, 4.0
+_DIFFERENCE = 1e-3  # the share of the smallest load step over which slopes are taken
+# In smallest load steps. One that failed was up to two of them, and the distance is known up to a factor.
+_NEAR = 4
+_SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode keeps near a limit point.
+
+
+def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
+    """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
+
+    Inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` where no unknown is free to move.
+    """
+    moves = _free(body)
+    if not body.comm.allreduce(moves.any(), MPI.LOR):
+        raise LinearSolveError("nothing is left to move")
+    vector: PETSc.Vec = body.system.b.duplicate()
+    image: PETSc.Vec = body.system.b.duplicate()
+    image.array[:] = moves * np.random.default_rng(body.comm.rank).normal(size=len(moves))
+    for _ in range(_ITERATIONS):
+        vector.array[:] = image.array * moves
+        vector.normalize()
+        linear.solve(vector, image, 1e-10)
+    vector.array[:] = image.array * moves
+    image.scale(float(vector.dot(vector)) ** -0.5)
+    return image
+
+
+def _free(body: AssembledBody) -> Floats:
+    """1 for each displacement of this rank's own that is not prescribed, 0 for every other unknown."""
+    free = np.zeros(body.system.size)
+    free[body.displacement.dofs.ravel()] = 1.0
+    free[body.system.fixed] = 0.0
+    return free[: body.system.owned]
+
+
+def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
+    """The displacements (n, 3) of the nodes of this rank in a ``mode``."""
+    found = np.zeros(body.system.size)
+    found[: body.system.owned] = mode.array
+    return found[body.displacement.dofs]
+
+
+def leave(body: AssembledBody, frame: float, share: float) -> float | None:
+    """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again
+    until there are fewer negative modes. The perturbation [mm]; None where the state is stable or no other was found. Collective.
+    """
+    if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
+        return None
+    before, body.system.contact = np.array(body.unknowns.x.array), body.contact
+    direction, size = _lowest(body, body.stability.pressures), share * diagonal(body.nodes.cells.points)
+    for amount in (sign * larger * size for larger in _LARGER for sign in (1, -1)):
+        body.unknowns.x.array[:] = before + amount * direction
+        body.unknowns.x.scatter_forward()
+        if body.contact:
+            body.contact.update(frame)
+        found = body.newton.solve(frame)
+        if found.converged and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
+            body.path.settle(body.energy(), connected=False)
+            if body.contact:
+                body.contact.settle()
+            return float(abs(amount))
+        body.go_back(before)
+    body.system.linearise()
+    return None
+
+
+def _lowest(body: AssembledBody, pressures: int) -> Floats:
+    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most. Inverse iteration, with a shift
+    that makes the tangent definite but for its ``pressures``.
+    """
+    system, free, dofs = body.system, _free(body), body.displacement.dofs
+    system.linearise()
+    entries = system.matrix.getDiagonal().array
+    total, count = body.comm.allreduce(np.array([np.abs(entries * free).sum(), free.sum()]), MPI.SUM)
+    shift = _SHIFT * total / count
+    while (solver := _shifted(body, shift * free)).negative_pivots() > pressures:
+        shift *= _GROWTH
+    moves = np.where(system.fixed[dofs], 0.0, _displacements(body, softest(body, solver)))
+    high = body.comm.allreduce(moves.max(initial=0.0), MPI.MAX)
+    low = body.comm.allreduce(moves.min(initial=0.0), MPI.MIN)
+    found = np.zeros(system.size)
+    found[dofs] = moves / (high if high >= -low else low)
+    return found
+
+
+def _shifted(body: AssembledBody, shift: Floats) -> Factorised:
+    """The factors of the tangent with ``shift`` (n,) added to its diagonal."""
+    raised, entries = body.system.matrix.duplicate(copy=True), body.system.matrix.getDiagonal()
+    entries.array[:] += shift
+    raised.setDiagonal(entries)
+    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # the type that the stubs declare
+    return Factorised(raised, True, False, "double", body.spent)
+
+
+@dataclass(frozen=True)
+class LimitPoint:
+    """The ``frame`` of a limit point, and the rest position [mm] where its mode moves most."""
+
+    frame: float
+    at: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        return (
+            f"the equilibrium comes to a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
+            f"largest at {place_of(self.at)}, is 0: no state is near beyond it, and what follows is a snap"
+        )
+
+
+def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
+    """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None where there is
+    none or it cannot be known. Collective.
+
+    Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is
+    linear, and the remaining path is half of the eigenvalue over its slope along the path. The slope is that of a Newton step.
+    """
+    if body.stability is None or body.clock.matters:
+        return None
+    before = np.array(body.unknowns.x.array)
+    try:
+        found = _limit_point(body, step * _DIFFERENCE)
+    except LinearSolveError:
+        return None
+    finally:
+        body.set_frame(body.at)
+        body.go_back(before)
+    return found if found is not None and found.frame - body.at <= _NEAR * step else None
+
+
+def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
+    system, now, ends = body.system, body.unknowns.x.array, []
+    start = np.array(now)
+    body.set_frame(body.at)
+    # Without contact, and at rest.
+    now[:], system.contact = 0, None
+    system.linearise()
+    at_rest = _stiffness(body, softest(body, body.linear))
+    now[:], system.contact = start, body.contact
+    system.linearise()
+    mode = softest(body, body.linear)
+    stiffness = _stiffness(body, mode)
+    if abs(stiffness) > _SOFT * at_rest:
+        return None
+    motion = _motion(body, difference)
+    for sign in (1, -1):
+        now[:] = start + sign * motion
+        if body.contact:
+            body.contact.update(body.at + sign * difference)
+        system.linearise()
+        ends.append(_stiffness(body, mode))
+    slope = (ends[0] - ends[1]) / (2 * difference)
+    left = -stiffness / (2 * slope) if slope != 0 else np.inf
+    return LimitPoint(body.at + left, _largest(body, mode)) if 0 < left < np.inf else None
+
+
+def _motion(body: AssembledBody, difference: float) -> Floats:
+    """The first-order change of the unknowns (n,) from the present state over a small ``difference`` in frames."""
+    system, frame = body.system, body.at + difference
+    body.set_frame(frame)
+    moves = -system.missing()
+    system.linearise(moves, body.contact.predicted(frame, moves) if body.contact else None)
+    step = system.b.duplicate()
+    body.linear.solve(system.b, step, 1e-9)
+    free = ~system.fixed[: system.owned]
+    before = np.array(body.unknowns.x.array)
+    body.unknowns.x.array[: system.owned] -= np.where(free, system.scale[: system.owned] * step.array, 0.0)
+    body.unknowns.x.scatter_forward()
+    found = np.asarray(body.unknowns.x.array - before + moves)
+    body.unknowns.x.array[:] = before
+    return found
+
+
+def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
+    """Twice the energy of a ``mode`` by the present tangent."""
+    image = mode.duplicate()
+    body.system.matrix.mult(mode, image)
+    return float(image.dot(mode))
+
+
+def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
+    """The rest position [mm] at which a mode moves most."""
+    lengths = np.linalg.norm(_displacements(body, mode), axis=1)
+    i = int(np.argmax(lengths))
+    place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()
+    _, (x, y, z) = max(body.comm.allgather((float(lengths[i]), place)))
+    return x, y, z
