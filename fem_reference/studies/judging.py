@@ -51,9 +51,7 @@ def compare(
 
 
 def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
-    """The convergence of the reference solver of a ``case`` with elements of order 1 and 2, as far as its ``problem`` can be
-    refined here; nothing of a muscle, whose error bars say more.
-    """
+    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2, where its mesh can be refined."""
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 

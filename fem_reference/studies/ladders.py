@@ -48,9 +48,7 @@ class Trial:
 
 
 def reference_trials(case: MuscleCase) -> Iterator[Trial]:
-    """The reference of a case on other tetrahedra; and on coarse ones with each setting varied that its solver says trades
-    accuracy for time, and with contact stiffer and softer.
-    """
+    """The reference of a case on other tetrahedra; on coarse ones with each trade of its solver varied, and with other contact."""
     whole = Trial(case, case.reference, "reference")
     yield whole
     yield from _sizes(whole)

@@ -96,9 +96,7 @@ def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars
 
 
 def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | None:
-    """New error bars where they were ``asked`` for; else those that are stored, or new ones where they cost less than a fifth of
-    the reference, or None, as of a run that did not converge or has no interior.
-    """
+    """Error bars: new ones where ``asked`` for; else stored ones, or new ones that cost less than a fifth of the reference."""
     if asked:
         return obtain(bench, reference)
     found = stored(reference)

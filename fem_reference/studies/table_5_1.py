@@ -36,9 +36,7 @@ FOREIGN = "Yours"
 
 
 def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
-    """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
-    read before anything is solved.
-    """
+    """The table over ``scenes``, with runs in ``store``; ``foreign`` frames, by case, are read before anything is solved."""
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {

@@ -156,9 +156,7 @@ def jittered(hard: Hard, number: int) -> Hard:
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """Compare ``count`` runs of a case on other meshes with the ``first``: all alike converged or not, and the greatest distance
-    over frames, in per cent of the body's size; at points of the same material.
-    """
+    """Compare ``count`` runs on other meshes with the ``first``: status, and greatest distance over frames [% of the size]."""
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
     ended, off, reached = Counter[str](), list[float](), list[int]()
     for number in range(1, count + 1):
