@@ -9,7 +9,7 @@ from typing import Any
 from fem_reference import metrics, report, solvers
 from fem_reference.assessment import judge
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case

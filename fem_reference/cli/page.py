@@ -6,9 +6,9 @@ from pathlib import Path
 
 from fem_reference import report
 from fem_reference.assessment.claims import Cover
+from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from fem_reference import solvers
 from fem_reference.assessment.cost_study import Study, facts
+from fem_reference.cli import DONE, SOLVER_FAILED, out
 from fem_reference.cli._cases import asked, case_part, changes, publish
 from fem_reference.cli._parser import CASE, share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out
 from fem_reference.report import study_page
 from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.pages import Page

@@ -20,8 +20,7 @@ from fem_reference.runs import store as runs
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.ladders import Trial
-from fem_reference.studies.scene_changes import without_states
+from fem_reference.studies.variations import Trial, without_states
 
 log = logging.getLogger(__name__)
 

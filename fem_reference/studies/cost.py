@@ -22,9 +22,8 @@ from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, each
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
-from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
-from fem_reference.studies.scene_changes import carried, resample
 from fem_reference.studies.true_errors import claims_of
+from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials, carried, reference_trials, resample
 
 log = logging.getLogger(__name__)
 
@@ -102,18 +101,10 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
 
 def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **settings_of(trial)}
-    return Point(
-        trial.scene.name,
-        trial.choice.solver,
-        trial.name,
-        trial.knob,
-        trial.value,
-        choice | ({"scene": trial.changed} if trial.changed else {}),
-        *one.ended,
-        errors={} if run is None else errors(run, truth, context),
-        costs={} if run is None else costs(run),
-    )
+    choice = {"solver": trial.choice.solver, **settings_of(trial)} | ({"scene": trial.changed} if trial.changed else {})
+    found = ({}, {}) if run is None else (errors(run, truth, context), costs(run))
+    named = trial.scene.name, trial.choice.solver, trial.name, trial.knob, trial.value
+    return Point(*named, choice, *one.ended, *found)
 
 
 def settings_of(trial: Trial) -> dict[str, object]:

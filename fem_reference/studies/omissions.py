@@ -24,7 +24,7 @@ from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
 from fem_reference.studies.cost import greatest, known
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.ladders import Trial
+from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 

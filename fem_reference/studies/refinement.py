@@ -28,7 +28,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.scene_changes import on_tetrahedra, with_contact, with_distances, without_states
+from fem_reference.studies.variations import on_tetrahedra, with_contact, with_distances, without_states
 
 log = logging.getLogger(__name__)
 

@@ -89,15 +89,6 @@ def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]
     cost = run.outcome.cost
     # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
-    return SolverResult(
-        kind,
-        run.name,
-        run.solver,
-        case.name,
-        run.outcome,
-        seconds_per_frame(run) if given is None else given,
-        measures,
-        run.numbers,
-        str(run.origin["machine"]),
-        of_reference=kind == REFERENCE,
-    )
+    seconds = seconds_per_frame(run) if given is None else given
+    named, machine = (kind, run.name, run.solver, case.name), str(run.origin["machine"])
+    return SolverResult(*named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE)
