@@ -74,6 +74,7 @@ def test_a_ball_that_passes_through_is_deep_in_the_bar(tmp_path) -> None:
     assert 2.6 < found[1] <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [(1, 1, 1), COARSE, FINE])
 def test_it_is_known_before_that_the_ball_reaches_the_bar(tmp_path, cells) -> None:
     for effects in ("listed", "auto"):
@@ -360,4 +361,4 @@ def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
 def test_a_frame_of_a_body_attached_by_nothing_states_nothing_of_attachments(squeezed) -> None:
     built = build_scene(squeezed)
     frame = Frame(0, np.array(built.surface.points), scalars={"energy": 1.0})
-    assert fenicsx._with_attachment_errors(built, frame).scalars == {"energy": 1.0}
+    assert fenicsx._attachment_errors(built, frame) == {}

@@ -92,6 +92,7 @@ def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
     assert "ZeroDivisionError" in found.sentence
 
 
+@pytest.mark.slow
 def test_a_busy_machine_turns_no_verdict(monkeypatch) -> None:
     """A solver that waits longer than it may work, and then solves, is judged as if it had not; one that works longer failed."""
     solve, waits, works = pbd.solve, [3.0], [0.0]
