@@ -10,28 +10,29 @@ from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
-from fem_reference.report import claims_page, field_page, ranking_page
+from fem_reference.report import claims_page, estimation_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import judging, table_5_1, true_errors
+from fem_reference.studies import estimation, judging, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
 
 HELP = "write a page over several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
 EXAMPLES = "octave-examples"
+ESTIMATION = "estimation"
 OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    names = sorted([EXAMPLES, TABLE, CLAIMS])
+    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION])
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
-    some = f"for {TABLE} and {CLAIMS}: this case, not all of them; may be repeated"
+    some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
@@ -42,10 +43,10 @@ def run(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
     if options.name == TABLE:
         return _table(options)
-    if options.name == CLAIMS and not (options.candidate or options.unit):
-        return _claims(options)
+    if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
+        return _claims(options) if options.name == CLAIMS else _estimation(options)
     if options.case or options.candidate or options.unit:
-        given = "--candidate or --unit" if options.name == CLAIMS else "--case, --candidate or --unit"
+        given = "--case, --candidate or --unit" if options.name == EXAMPLES else "--candidate or --unit"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
     return _examples(options)
 
@@ -94,6 +95,16 @@ def _claims(options: argparse.Namespace) -> int:
     asked = _asked(scenes, options)
     publish(options, asked, claims_page.page(found), claims_page.facts(found), "\n".join(printed))
     return SOLVER_FAILED if found.missing else DONE
+
+
+def _estimation(options: argparse.Namespace) -> int:
+    """The report's estimation techniques."""
+    scenes = [casefile.read_muscle(case) for case in options.case or estimation.CASES]
+    found = estimation.estimate(scenes)
+    printed = [estimation_page.said(found), *(f"left out: {case}: {why}" for case, why in found.missing.items())]
+    page = estimation_page.page(found)
+    publish(options, _asked(scenes, options), page, estimation_page.facts(found), "\n".join(printed))
+    return DONE
 
 
 def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:

@@ -1,0 +1,107 @@
+"""The page ``estimation``: curves, radial basis functions and implicit surfaces of the report's chapter 3 and section 7.1."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fem_reference.geometry.curves import TECHNIQUES
+from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.pages import Page
+from fem_reference.report.tables import finite
+from fem_reference.studies.estimation import CurveError, Estimation
+
+# Control points in the plane, as in the report's Figure 3.1.
+_POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])
+
+
+def page(found: Estimation) -> Page:
+    """The page of the errors of estimation techniques."""
+    contents = {"found": found, "techniques": TECHNIQUES, "fibres": by_fibres(found), "drawings": [_figure(), _curves(found), _fits(found)]}
+    return Page(
+        "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
+    )
+
+
+def said(found: Estimation) -> str:
+    """The best technique for fibres, and what Gaussians give."""
+    by_technique = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
+    best = min(by_technique, key=lambda name: float(by_technique[name]))
+    most = max(one.gaussians for one in found.fits)
+    fits = [one for one in found.fits if one.gaussians == most]
+    return (
+        f"of curves through a few points of a fibre {best} deviates least; {most} Gaussians miss a muscle's surface by "
+        f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
+        f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+    )
+
+
+def facts(found: Estimation) -> dict[str, Any]:
+    """All of it as valid JSON."""
+    rows = {name: [asdict(one) for one in getattr(found, name)] for name in ("curves", "heights", "fits")}
+    for one in rows["heights"]:
+        one["condition"] = finite(one["condition"])
+    return {**rows, "missing": found.missing}
+
+
+def _style(i: int) -> dict[str, str]:
+    """The look of the i-th technique."""
+    return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
+
+
+def by_fibres(found: Estimation) -> dict[tuple[str, int], list[CurveError]]:
+    """The errors of all techniques by case and known points."""
+    keys = dict.fromkeys((one.case, one.known) for one in found.curves)
+    return {key: [one for one in found.curves if (one.case, one.known) == key] for key in keys}
+
+
+def _figure() -> Drawing:
+    """The report's Figure 3.1: all techniques through the same points."""
+
+    def draw(_: Figure, axes: Axes) -> None:
+        for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
+            line = make(_POINTS)(np.linspace(0, 1, 400))
+            axes.plot(*line.T, linewidth=1.4, **_style(i), label=name)
+        axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
+        axes.set_xlabel("x")
+        axes.set_ylabel("y")
+        axes.legend(fontsize="x-small")
+
+    return drawn("estimation-curves", "Curves through the same five points (Figure 3.1)", (4.6, 4.0), draw)
+
+
+def _curves(found: Estimation) -> Drawing:
+    """Errors against the number of known points, over all cases."""
+
+    def draw(_: Figure, axes: Axes) -> None:
+        for i, name in enumerate(TECHNIQUES):
+            counts = sorted({one.known for one in found.curves})
+            means = [
+                np.mean([one.rms for one in found.curves if (one.technique, one.known) == (name, n)]) for n in counts
+            ]
+            axes.plot(counts, means, marker="o", markersize=3, **_style(i), label=name)
+        logarithmic(axes)
+        axes.set_xlabel("known points of a fibre")
+        axes.set_ylabel("rms deviation of the others, mm")
+        axes.legend(fontsize="x-small")
+
+    return drawn("estimation-fibres", "Fibres: error against known points", (4.6, 4.0), draw)
+
+
+def _fits(found: Estimation) -> Drawing:
+    """Errors of implicit surfaces against the number of Gaussians, by case."""
+
+    def draw(_: Figure, axes: Axes) -> None:
+        for i, case in enumerate(dict.fromkeys(one.case for one in found.fits)):
+            some = [one for one in found.fits if one.case == case]
+            axes.plot(
+                [one.gaussians for one in some], [one.rms for one in some], "o-", color=colour_of(i + 1), label=case
+            )
+        logarithmic(axes)
+        axes.set_xlabel("Gaussians")
+        axes.set_ylabel("rms deviation of the surface, mm")
+        axes.legend(fontsize="x-small")
+
+    return drawn("estimation-surfaces", "Muscles: error against Gaussians", (4.6, 4.0), draw)
