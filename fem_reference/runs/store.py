@@ -5,7 +5,7 @@
                               /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
                               /fibres.pvd      fibre polylines, where the solver has an interior
                               /tets.pvd        tetrahedra, where the solver has them
-                              /field.pvd       a scalar field on its mesh, for a scalar problem (``fields``)
+                              /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
                               /state/          the unknowns of the tetrahedra, where requested (``states``)
                               /restart/        of an unfinished run: the state from which its solver continues (``cut_off``)
 
@@ -29,10 +29,8 @@ from fem_reference.io import files, texts
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import fields
 from fem_reference.runs.contents import Contents, Status, frame_file
-from fem_reference.runs.fields import NodalField
-from fem_reference.runs.states import NodalState
+from fem_reference.runs.states import FIELD, VALUES, NodalField, NodalState, read_field
 from fem_reference.scenes.case import Part
 
 
@@ -74,7 +72,7 @@ class Frame:
         :class:`NodalField`.
         """
         more = {} if components is None else {"components": components}
-        return cls(problem.frames[0], field=NodalField(problem.mesh, {fields.VALUES: values} | more, form))
+        return cls(problem.frames[0], field=NodalField(problem.mesh, {VALUES: values} | more, form))
 
 
 Sink = Callable[[Frame], None]
@@ -144,7 +142,7 @@ class Run:
     @property
     def values(self) -> Floats:
         """The scalar field at all nodes (f, N); KeyError for a run without one."""
-        return self.fields[fields.VALUES]
+        return self.fields[VALUES]
 
     @property
     def vertex_values(self) -> Floats:
@@ -208,8 +206,8 @@ def load(folder: Path) -> Run:
     whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
     scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}
     whose |= {"scalars": scalars, "residuals": stored.residuals}
-    if fields.FOLDER in stored.parts:
-        mesh, arrays = fields.read(folder, stored.numbers)
+    if FIELD in stored.parts:
+        mesh, arrays = read_field(folder, stored.numbers)
         return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)
     return Run(**whose, **_moved(folder, stored.numbers, stored.parts))
 

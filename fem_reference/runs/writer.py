@@ -15,7 +15,7 @@ from typing import Any
 
 from fem_reference.io import files
 from fem_reference.problems.problem import NOTHING, AtRest
-from fem_reference.runs import cut_off, fields, states
+from fem_reference.runs import cut_off, states
 from fem_reference.runs.contents import FORMAT, RunJson, frame_file
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome
@@ -71,13 +71,13 @@ class Writer:
             parts["tets"] = lambda path: files.write_tets(path, mesh, frame.points)
         stored = ["state"] if self._write_unknowns(frame) else []
         if (solved := frame.field) is not None:
-            parts[fields.FOLDER] = lambda path: fields.write(path, solved)
+            parts[states.FIELD] = lambda path: states.write_field(path, solved)
             self.state["origin"]["form"] = solved.form
         self.state["numbers"].append(frame.number)
         self.state["residuals"].append(frame.residuals)
         self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
-            suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
+            suffix = ".vtu" if part in ("tets", states.FIELD) else ".vtp"
             (self.folder / part).mkdir(exist_ok=True)
             names = [(number, f"{part}/{frame_file(number, suffix)}") for number in self.state["numbers"]]
             write(self.folder / names[-1][1])
