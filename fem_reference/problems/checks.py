@@ -188,9 +188,8 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
         if not facets:
             raise InputError(f"facets.{name}", "none", "facets of one cell each")
         if lost:
-            got = (
-                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
-            )
+            some = f"{len(lost)} of {len(facets)}, the first with corners {lost[0]}"
+            got = f"facets that are not of one cell each ({some})"
             raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
 
 

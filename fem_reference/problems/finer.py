@@ -107,11 +107,8 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
     for side in sides:
         off = shares[:, every[:, None], np.setdiff1d(every, side)].any(axis=2)  # (8, c)
         parts.append([(part, other) for part in range(8) for other in sides if not off[part, list(other)].any()])
-    at = {
-        tuple(sorted(cell[k] for k in side)): (i, j)
-        for i, cell in enumerate(mesh.cells.tolist())
-        for j, side in enumerate(sides)
-    }
+    cells = enumerate(mesh.cells.tolist())
+    at = {tuple(sorted(cell[k] for k in side)): (i, j) for i, cell in cells for j, side in enumerate(sides)}
     found = {}
     for name, facets in mesh.facets.items():
         places = [at[tuple(sorted(facet))] for facet in facets.tolist()]

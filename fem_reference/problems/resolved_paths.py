@@ -116,9 +116,8 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
     ends = np.unique(np.clip([first, *knots, last], first, last))
     turned = np.abs(np.diff(np.interp(ends, knots, angles))) if len(knots) else np.zeros(len(ends) - 1)
     if not turned.sum() < _MOST * _SAMPLED:
-        raise InputError(
-            f"{thing.place}: path", f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
-        )
+        got, want = f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
+        raise InputError(f"{thing.place}: path", got, want)
     counts = np.maximum(np.ceil(turned / _SAMPLED - 1e-9), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count + 1) for (a, b), count in zip(pairwise(ends), counts, strict=True)])
 
@@ -135,11 +134,9 @@ class _Samples:
             self.strides = [_steps(place) for place in self.places]
             bodies = [place for thing, place in zip(things, self.places, strict=True) if not thing.scale]
             alike = np.mean([place.mean(axis=1) for place in bodies], axis=0) if bodies else np.zeros((len(frames), 3))
-            self.apart = [
-                _steps(place if thing.scale else place - alike[:, None])
-                for thing, place in zip(things, self.places, strict=True)
-            ]
-            self.angles = [_turns(thing, frames, place) for thing, place in zip(things, self.places, strict=True)]
+            both = list(zip(things, self.places, strict=True))
+            self.apart = [_steps(place if thing.scale else place - alike[:, None]) for thing, place in both]
+            self.angles = [_turns(thing, frames, place) for thing, place in both]
             self.lengths, self.travels, self.turns = (
                 [np.concatenate([np.zeros_like(one[:1]), np.cumsum(one, axis=0)]) for one in steps]
                 for steps in (self.strides, self.apart, self.angles)
