@@ -79,9 +79,7 @@ def _linear(kind: Kind, places: Floats) -> Floats:
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The values (q, k) of the nodes' polynomials, 1 at their node and 0 at all others, at ``places`` (q, 3) of the reference
-    cell.
-    """
+    """The nodes' polynomials (q, k), 1 at their own node and 0 at others, at ``places`` (q, 3) in the cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)

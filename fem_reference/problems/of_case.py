@@ -175,9 +175,7 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that the case omitted, in solved frames; None where it omitted none. ``rest`` is its set-up,
-    ``built`` gives its problem.
-    """
+    """The watch for effects that a case omitted, from its set-up and its problem; None where it omitted none."""
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle

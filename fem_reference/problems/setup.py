@@ -56,9 +56,7 @@ class Bone:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
-    (None) exactly.
-    """
+    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
 
     attachment: str
     bone: Bone

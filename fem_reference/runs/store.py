@@ -1,20 +1,17 @@
 """Runs: the result of a solver on a problem, in memory and on disk.
 
-        <store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
-                              /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
-                              /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
-                              /fibres.pvd      fibre polylines, where the solver has an interior
-                              /tets.pvd        tetrahedra, where the solver has them
-                              /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
-                              /state/          the unknowns of the tetrahedra, where requested (``states``)
-                              /restart/        of an unfinished run: the state from which its solver continues (``cut_off``)
-
-Files are written atomically; ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
-crashed; it is not read as a result, and continues where its solver can.
+<store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
+                      /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                      /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
+                      /fibres.pvd      fibre polylines, where the solver has an interior
+                      /tets.pvd        tetrahedra, where the solver has them
+                      /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
+                      /state/          the unknowns of the tetrahedra, where requested (``states``)
+                      /restart/        of an unfinished run: the state from which its solver continues (``writer``)
 """
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +65,7 @@ class Frame:
 
     @classmethod
     def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
-        """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if any, as in
-        :class:`NodalField`.
-        """
+        """The frame of a field solved in a weak ``form``, with ``values`` and ``components`` as :class:`NodalField`."""
         more = {} if components is None else {"components": components}
         return cls(problem.frames[0], field=NodalField(problem.mesh, {VALUES: values} | more, form))
 
@@ -255,3 +250,45 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
     except InputError:
         return None
     return run if run.outcome.status in ended else None
+
+
+def complete(run: Run, numbers: tuple[int, ...]) -> Run:
+    """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
+    if run.numbers == numbers:
+        return run
+    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
+
+    def pick(values: Floats) -> Floats:
+        blank = np.full(values.shape[1:], np.nan)
+        return np.stack([blank if row is None else values[row] for row in rows])
+
+    return replace(
+        run,
+        numbers=numbers,
+        positions=pick(run.positions),
+        fibre_positions=None if run.fibre_positions is None else pick(run.fibre_positions),
+        scalars={name: pick(values) for name, values in run.scalars.items()},
+        fields={name: pick(values) for name, values in run.fields.items()},
+    )
+
+
+def seconds_per_frame(run: Run) -> float | None:
+    """Time [s] to solve one reached frame after the first; None where the run was computed elsewhere and no time is given.
+
+    ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
+    """
+    cost = run.outcome.cost
+    seconds = cost.get("seconds_solve", cost.get("seconds"))
+    solved = reached(run) - 1
+    if run.solver == "recorded":
+        each = cost.get("seconds_per_frame")  # per frame number
+        return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
+    if seconds is None or solved < 1:
+        return None
+    return seconds / solved
+
+
+def reached(run: Run) -> int:
+    """The number of frames with positions of the surface, or of the fibres where there is no surface."""
+    positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
+    return int(np.isfinite(positions).all(axis=(1, 2)).sum())

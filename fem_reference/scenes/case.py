@@ -186,9 +186,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Causes of verdicts: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
-        the settings that change their answer.
-        """
+        """Causes of verdicts: what determines solutions, and the judged solvers with the settings that matter."""
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [
