@@ -1,7 +1,8 @@
 """Points, triangles and lines as readers of any format return them: checks that they all share."""
 
+import re
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,3 +97,45 @@ def of_meshio(mesh: Any) -> Soup:
     if other := {block.type for block in blocks} - {"triangle"}:
         raise ValueError(f"cells of type {', '.join(sorted(other))}")
     return mesh.points, np.concatenate([np.empty((0, 3), np.int64), *(block.data for block in blocks)])
+
+
+class PointLists(NamedTuple):
+    """Cells as lists of points: ``sizes`` (m,), and the points of all, one after the other, in ``corners``."""
+
+    sizes: Ints
+    corners: Ints
+
+
+class DataSet(NamedTuple):
+    """A data set of a ``kind``, ``PolyData`` or ``UnstructuredGrid``: ``points`` (n, 3), ``cells`` by the name that XML files give
+    them, and the ``types`` (m,) of those of a grid.
+    """
+
+    kind: str
+    points: Any
+    cells: dict[str, PointLists]
+    types: Any
+
+
+def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
+    """Cells of ``sizes`` (m,) in ``corners``; ValueError where one has a negative size or a point that does not exist."""
+    sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
+    if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):
+        raise ValueError(f"cells that do not fit in their {len(corners)} corners")
+    if len(wrong := np.flatnonzero((corners < 0) | (corners >= points))):
+        cell = np.searchsorted(np.cumsum(sizes), wrong[0], side="right")
+        raise ValueError(f"cell {cell} with a point that does not exist, of {points}")
+    return PointLists(sizes, corners)
+
+
+def whole_number(text: str, name: str) -> int:
+    """The number that a text states; ValueError with its ``name`` where it is none of 1 to 18 digits."""
+    if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
+        raise ValueError(f'{name} of "{text[:40]}"')
+    return int(text)
+
+
+def check_number(values: Any, count: int, name: str) -> None:
+    """ValueError where there are not ``count`` values of this ``name``."""
+    if len(values) != count:
+        raise ValueError(f"{len(values)} {name} of {count}")

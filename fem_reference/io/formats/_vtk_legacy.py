@@ -6,11 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.io.formats._vtk_cells import DataSet, PointLists, checked
+from fem_reference.io.soup import DataSet, check_number, checked_cells, whole_number
 
 _HEAD = re.compile(rb"# vtk DataFile Version (\d+)\.(\d+)[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)\s*?\n")
 _KINDS = {b"POLYDATA": "PolyData", b"UNSTRUCTURED_GRID": "UnstructuredGrid"}
-_CELLS = {"LINES": "Lines", "POLYGONS": "Polys", "TRIANGLE_STRIPS": "Strips", "CELLS": "Cells", "VERTICES": "Verts"}
+_CELLS = {
+    "LINES": "Lines",
+    "POLYGONS": "Polys",
+    "TRIANGLE_STRIPS": "Strips",
+    "CELLS": "Cells",
+    "VERTICES": "Verts",
+}
 _TYPES = {
     "char": "i1", "signed_char": "i1", "short": "i2", "int": "i4", "long": "i8", "vtktypeint32": "i4", "vtktypeint64": "i8",
     "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",
@@ -22,127 +28,55 @@ _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; ValueError or another exception where it is none, or not whole."""
+    """The data set of a file; ValueError or another exception where it is none, or not whole. Sections other than points and cells
+    are skipped, to their end.
+    """
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no head of a VTK file")
     if head[4] not in _KINDS:
         raise ValueError(f"a VTK file of {head[4].decode()}, neither {' nor '.join(_KINDS.values())}")
-    return _File(data, head.end(), text=head[3] == b"ASCII", new=int(head[1]) >= 5).read(_KINDS[head[4]])
+    file = _File(data, head.end(), text=head[3] == b"ASCII")
+    kind, points, types = _KINDS[head[4]], np.zeros((0, 3)), np.zeros(0, np.int64)
+    parts: dict[str, tuple[Any, Any]] = {}
+    while words := file.line():
+        name = words[0].upper()
+        if name == "POINTS":
+            points = file.array(words[1], words[2], 3).reshape(-1, 3)
+        elif name in _CELLS:
+            read_cells = file.cells_by_offsets if int(head[1]) >= 5 else file.cells
+            parts[_CELLS[name]] = read_cells(words[1], words[2])
+        elif name == "CELL_TYPES":
+            types = file.array(words[1], "int")
+        else:
+            file.skip(name, words)
+    cells = {name: checked_cells(*parts.get(name, ([], [])), len(points)) for name in _CELLS.values()}
+    if kind == "UnstructuredGrid":
+        check_number(types, len(cells["Cells"].sizes), "types")
+    return DataSet(kind, points, cells, types)
 
 
 class _File:
-    """The bytes of a file, read from ``at``; ``new``: of version 5, with offsets."""
+    """The bytes of a file, text or binary, read from ``at``; ``values`` is the number of points or cells with attributes."""
 
-    def __init__(self, data: bytes, at: int, *, text: bool, new: bool) -> None:
-        self.data, self.at, self.text, self.new = data, at, text, new
-        self.count = 0
-        self.points: Any = np.zeros((0, 3))
-        self.parts: dict[str, tuple[Any, Any]] = {}
-        self.types: Any = np.zeros(0, np.int64)
+    def __init__(self, data: bytes, at: int, *, text: bool) -> None:
+        self.data, self.at, self.text, self.values = data, at, text, "0"
 
-    def read(self, kind: str) -> DataSet:
-        """All sections; what is not of points and cells is passed over, to its end."""
-        while (words := self._line()) is not None:
-            self._section(words)
-        cells = {name: self._cells(name) for name in set(_CELLS.values())}
-        if kind == "UnstructuredGrid" and len(self.types) != len(cells["Cells"].sizes):
-            raise ValueError(f"{len(self.types)} types of {len(cells['Cells'].sizes)} cells")
-        return DataSet(kind, self.points, cells, self.types)
-
-    def _cells(self, name: str) -> PointLists:
-        return checked(*self.parts.get(name, ([], [])), len(self.points))
-
-    def _section(self, words: list[str]) -> None:
-        name = words[0].upper()
-        if name == "POINTS":
-            self.points = self._array(3 * _number(words[1]), words[2]).reshape(-1, 3)
-        elif name in _CELLS:
-            self.parts[_CELLS[name]] = self._sizes_and_corners(_number(words[1]), _number(words[2]))
-        elif name == "CELL_TYPES":
-            self.types = np.asarray(self._array(_number(words[1]), "int"), np.int64)
-        elif name in ("POINT_DATA", "CELL_DATA"):
-            self.count = _number(words[1])
-        elif name == "FIELD":
-            self._field(_number(words[2]))
-        elif name == "METADATA":
-            self._to_empty_line()
-        else:
-            self._attribute(name, words)
-
-    def _sizes_and_corners(self, count: int, size: int) -> tuple[Any, Any]:
-        """Sizes of cells and their corners; in old files each cell is preceded by its size."""
-        if self.new:
-            offsets, corners = self._named("OFFSETS", count), self._named("CONNECTIVITY", size)
-            if count and offsets[0] != 0:
-                raise ValueError("offsets that do not begin with 0")
-            return np.diff(np.asarray(offsets, np.int64)), corners
-        values = self._array(size, "int").tolist()
-        sizes, corners, at = list[int](), list[int](), 0
-        while at < len(values):
-            if not 0 <= values[at] < len(values) - at:
-                raise ValueError("cells that do not fit in their list")
-            sizes.append(values[at])
-            corners += values[at + 1 : at + 1 + values[at]]
-            at += 1 + values[at]
-        if len(sizes) != count:
-            raise ValueError(f"{len(sizes)} cells of {count}")
-        return sizes, corners
-
-    def _named(self, name: str, length: int) -> Any:
-        """The array on whose line is a ``name`` and then its type."""
-        words = self._line() or [""]
-        if words[0].upper() != name:
-            raise ValueError(f"no {name} of cells")
-        return self._array(length, words[1])
-
-    def _attribute(self, name: str, words: list[str]) -> None:
-        of_bytes = "float" if self.text else "unsigned_char"
-        if name == "SCALARS":
-            if re.match(rb"\s*LOOKUP_TABLE\s", self.data[self.at : self.at + 100], re.IGNORECASE):
-                self._line()
-            self._array((_number(words[3]) if len(words) > 3 else 1) * self.count, words[2])
-        elif name == "LOOKUP_TABLE":
-            self._array(4 * _number(words[2]), of_bytes)
-        elif name in ("COLOR_SCALARS", "TEXTURE_COORDINATES"):
-            self._array(_number(words[2]) * self.count, words[3] if name[0] == "T" else of_bytes)
-        elif name in _COMPONENTS:
-            self._array(_COMPONENTS[name] * self.count, words[2])
-        else:
-            raise ValueError(f'a section "{name[:40]}"')
-
-    def _field(self, arrays: int) -> None:
-        left = arrays
-        while left:
-            words = self._line()
-            if words is None:
-                raise ValueError(f"{arrays - left} of {arrays} arrays of a field")
-            if words[0] == "METADATA":
-                self._to_empty_line()
-                continue
-            self._array(_number(words[1]) * _number(words[2]), words[3])
-            left -= 1
-
-    def _line(self) -> list[str] | None:
-        """The words of the next line that has some; None at the end."""
-        while self.at < len(self.data):
+    def line(self) -> list[str]:
+        """The words of the next line that has some; none at the end."""
+        words = list[str]()
+        while not words and self.at < len(self.data):
             end = self.data.find(b"\n", self.at)
             end = len(self.data) if end < 0 else end
             words = self.data[self.at : min(end, self.at + 1000)].decode("utf-8", errors="replace").split()
             self.at = end + 1
-            if words:
-                return words
-        return None
+        return words
 
-    def _to_empty_line(self) -> None:
-        found = re.compile(rb"\n[ \t\r]*\n").search(self.data, max(self.at - 1, 0))
-        self.at = len(self.data) if found is None else found.end()
-
-    def _array(self, count: int, kind: str) -> Any:
-        """So many numbers of a kind; ValueError where there are fewer."""
-        dtype = np.dtype(">" + _TYPES[kind.lower()]) if kind.lower() in _TYPES else None
-        if dtype is None:
+    def array(self, number: str, kind: str, components: int = 1) -> Any:
+        """``number`` times ``components`` values of a ``kind``; ValueError where there are fewer."""
+        if kind.lower() not in _TYPES:
             raise ValueError(f'numbers of type "{kind}"')
+        dtype, count = np.dtype(">" + _TYPES[kind.lower()]), whole_number(number, "a count") * components
         if count > len(self.data) - self.at + 1:
             raise ValueError(f"{count} numbers said to be in {len(self.data) - self.at} bytes")
         if not self.text:
@@ -150,15 +84,67 @@ class _File:
             self.at += found.nbytes
             return found
         words = list(islice(re.compile(rb"\S+").finditer(self.data, self.at), count))
-        if len(words) < count:
-            raise ValueError(f"{len(words)} numbers of {count}")
+        check_number(words, count, "numbers")
         self.at = words[-1].end() if words else self.at
         with np.errstate(over="ignore"):
             values = np.array([word[0] for word in words], bytes)
             return values.astype(np.float64 if dtype.kind == "f" else np.int64).astype(dtype.newbyteorder("="))
 
+    def cells(self, count: str, size: str) -> tuple[Any, Any]:
+        """Sizes of cells and their corners, in files before version 5: each cell is preceded by its size."""
+        values = self.array(size, "int").tolist()
+        sizes, corners, at = list[int](), list[int](), 0
+        while at < len(values):
+            sizes.append(values[at])
+            corners += values[at + 1 : at + 1 + max(0, values[at])]
+            at += 1 + max(0, values[at])
+        check_number(sizes, whole_number(count, "a count"), "cells")
+        return sizes, corners
 
-def _number(word: str) -> int:
-    if not re.fullmatch(r"\d{1,18}", word, re.ASCII):
-        raise ValueError(f'a count of "{word[:40]}"')
-    return int(word)
+    def cells_by_offsets(self, count: str, size: str) -> tuple[Any, Any]:
+        """Sizes of cells and their corners, from version 5 on."""
+        offsets, corners = self._named("OFFSETS", count), self._named("CONNECTIVITY", size)
+        if len(offsets) and offsets[0] != 0:
+            raise ValueError("offsets that do not begin with 0")
+        return np.diff(np.asarray(offsets, np.int64)), corners
+
+    def _named(self, name: str, count: str) -> Any:
+        """The array on whose line is a ``name`` and then its type."""
+        words = self.line()
+        if words[:1] != [name]:
+            raise ValueError(f"no {name} of cells")
+        return self.array(count, words[1])
+
+    def skip(self, name: str, words: list[str]) -> None:
+        """Go to the end of a section, which begins with a line of ``words``; ValueError where its arrays are not whole."""
+        of_bytes = "float" if self.text else "unsigned_char"
+        if name in ("POINT_DATA", "CELL_DATA"):
+            self.values = words[1]
+        elif name == "METADATA":
+            found = re.compile(rb"\n[ \t\r]*\n").search(self.data, max(self.at - 1, 0))
+            self.at = len(self.data) if found is None else found.end()
+        elif name == "FIELD":
+            self._skip_field(words[2])
+        elif name == "SCALARS":
+            self.line()  # the name of its lookup table
+            self.array(self.values, words[2], whole_number(words[3], "a count") if len(words) > 3 else 1)
+        elif name == "LOOKUP_TABLE":
+            self.array(words[2], of_bytes, 4)
+        elif name in ("COLOR_SCALARS", "TEXTURE_COORDINATES"):
+            self.array(self.values, words[3] if name[0] == "T" else of_bytes, whole_number(words[2], "a count"))
+        elif name in _COMPONENTS:
+            self.array(self.values, words[2], _COMPONENTS[name])
+        else:
+            raise ValueError(f'a section "{name[:40]}"')
+
+    def _skip_field(self, arrays: str) -> None:
+        left = whole_number(arrays, "a count")
+        while left:
+            words = self.line()
+            if not words:
+                raise ValueError(f"a field with {left} of {arrays} arrays missing")
+            if words[0] == "METADATA":
+                self.skip("METADATA", words)
+            else:
+                self.array(words[2], words[3], whole_number(words[1], "a count"))
+                left -= 1

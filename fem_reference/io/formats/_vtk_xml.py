@@ -1,6 +1,6 @@
 """VTK's XML formats, read with numpy alone: no array is made that the file has no bytes for.
 
-VTK's own readers are native code that believes a file: what it says wrongly ends or hangs the process.
+VTK's own readers are native code that believes a file: a false number in it crashes or hangs the process.
 """
 
 import base64
@@ -14,19 +14,20 @@ from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 
-from fem_reference.io.formats._vtk_cells import DataSet, checked, joined
+from fem_reference.foundations.mesh import Ints
+from fem_reference.io.soup import DataSet, PointLists, check_number, checked_cells, whole_number
 from fem_reference.io.texts import check_no_entities
 
+_KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells",)}
+_TYPES = {"Float32": "f4", "Float64": "f8"}
+_TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
+_END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
 # The most bytes of an array that was compressed.
 _MOST = 2**28
-_KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells",)}
-_END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-_TYPES = {"Float32": "f4", "Float64": "f8"}
-_TYPES |= {f"{sign}Int{8 * size}": f"{code}{size}" for sign, code in (("", "i"), ("U", "u")) for size in (1, 2, 4, 8)}
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; ValueError or another exception where it is none, or not whole."""
+    """The data set of a file, its pieces as one; ValueError or another exception where it is none, or not whole."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
@@ -35,41 +36,40 @@ def read(data: bytes) -> DataSet:
     kind = root.get("type", "nothing")
     if root.tag != "VTKFile" or kind not in _KINDS:
         raise ValueError(f"a VTK file of {kind}, neither {' nor '.join(_KINDS)}")
-    arrays = _Arrays(root, appended)
-    pieces = root.findall(f"{kind}/Piece")
-    if not pieces:
-        return DataSet(kind, np.zeros((0, 3)), {})
-    return joined([_piece(piece, kind, arrays.read) for piece in pieces])
+    arrays, first = _Arrays(root, appended), 0
+    points, types = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    cells = {name: [PointLists(types[0], types[0])] for name in _KINDS[kind]}
+    for piece in root.findall(f"{kind}/Piece"):
+        points.append(_points(piece, arrays))
+        for name, parts in cells.items():
+            sizes, corners, own_types = _cells(piece, name, arrays, len(points[-1]))
+            parts.append(PointLists(sizes, corners + first))
+            types.append(own_types)
+        first += len(points[-1])
+    whole = {name: PointLists(*map(np.concatenate, zip(*parts, strict=True))) for name, parts in cells.items()}
+    return DataSet(kind, np.concatenate(points), whole, np.concatenate(types))
 
 
-def _piece(piece: Element, kind: str, read_array: Callable[[Element], Any]) -> DataSet:
-    count = _count(piece, "NumberOfPoints")
-    found = piece.find("Points/DataArray")
-    if found is None and count:
-        raise ValueError("no points")
-    points = np.zeros((0, 3)) if found is None or not count else read_array(found).reshape(-1, 3)
-    if len(points) != count:
-        raise ValueError(f"{len(points)} points of {count}")
-    cells, types = {}, np.zeros(0, np.int64)
-    for name in _KINDS[kind]:
-        arrays = {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
-        number = _count(piece, f"NumberOf{name}")
-        ends, corners = (read_array(arrays[key]) if number else [] for key in ("offsets", "connectivity"))
-        if len(ends) != number:
-            raise ValueError(f"{len(ends)} offsets of {number} cells")
-        cells[name] = checked(np.diff(np.asarray(ends, np.int64), prepend=0), corners, count)
-        if kind == "UnstructuredGrid" and number:
-            types = np.asarray(read_array(arrays["types"]), np.int64)
-            if len(types) != number:
-                raise ValueError(f"{len(types)} types of {number} cells")
-    return DataSet(kind, points, cells, types)
+def _number_of(piece: Element, name: str) -> int:
+    return whole_number(piece.get(f"NumberOf{name}", "0").strip(), f"NumberOf{name}")
 
 
-def _count(piece: Element, name: str) -> int:
-    text = piece.get(name, "0").strip()
-    if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
-        raise ValueError(f'{name} of "{text[:40]}"')
-    return int(text)
+def _points(piece: Element, arrays: "_Arrays") -> Any:
+    count, found = _number_of(piece, "Points"), piece.find("Points/DataArray")
+    points = np.zeros((0, 3)) if found is None or not count else arrays.read(found).reshape(-1, 3)
+    check_number(points, count, "points")
+    return points
+
+
+def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[Ints, Ints, Ints]:
+    """Sizes, corners and types of the cells of a piece with this ``name``, between so many points; polygons have no types."""
+    count, found = _number_of(piece, name), {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
+    wanted = ("offsets", "connectivity", *(["types"] if name == "Cells" else []))
+    ends, corners, *types = (np.asarray(arrays.read(found[key]) if count else [], np.int64) for key in wanted)
+    check_number(ends, count, "offsets")
+    for one in types:
+        check_number(one, count, "types")
+    return *checked_cells(np.diff(ends, prepend=0), corners, points), np.concatenate([ends[:0], *types])
 
 
 class _Arrays:
@@ -86,26 +86,23 @@ class _Arrays:
 
     def read(self, array: Element) -> Any:
         """The numbers of a DataArray, in one dimension."""
-        kind = _TYPES.get(array.get("type", ""))
+        kind, form, text = _TYPES.get(array.get("type", "")), array.get("format", "ascii"), array.text or ""
         if kind is None:
             raise ValueError(f'an array of type "{array.get("type")}"')
-        form = array.get("format", "ascii")
-        dtype = np.dtype(self.order + kind)
         if form == "ascii":
-            return _numbers(array.text or "", np.dtype(kind))
+            return _numbers(text, np.dtype(kind))
         if form == "appended":
             offset = int(array.attrib["offset"])
             if not 0 <= offset <= len(self.appended):
                 raise ValueError(f"an array at {offset} of {len(self.appended)} bytes")
             data, encoded = memoryview(self.appended)[offset:], self.encoded
         else:
-            data, encoded = memoryview("".join((array.text or "").split()).encode("ascii")), True
-        return np.frombuffer(self._bytes(data, encoded=encoded), dtype)
+            data, encoded = memoryview("".join(text.split()).encode("ascii")), True
+        return np.frombuffer(self._bytes(data, _decoded if encoded else _taken), self.order + kind)
 
-    def _bytes(self, data: memoryview, *, encoded: bool) -> bytes:
+    def _bytes(self, data: memoryview, take: Callable[[memoryview, int], bytes]) -> bytes:
         """Bytes stored at the beginning of ``data``, behind a header with their length, or with those of compressed blocks."""
         size = self.header.itemsize
-        take = _decoded if encoded else _taken
         if not self.compressor:
             (count,) = np.frombuffer(take(data, size), self.header).tolist()
             return take(data, size + count)[size:]
@@ -115,11 +112,11 @@ class _Arrays:
             raise ValueError(f"an array of {total} bytes, more than {_MOST} or than the file has blocks for")
         head = size * (3 + blocks)
         lengths = np.frombuffer(take(data, head), self.header)[3:].tolist()
-        packed = take(data[4 * -(-head // 3) :] if encoded else data[head:], sum(lengths))
+        packed = take(data[4 * -(-head // 3) if take is _decoded else head :], sum(lengths))
         found, at = bytearray(), 0
         for i, length in enumerate(lengths):
             wanted = last if last and i == blocks - 1 else block
-            part = _UNPACKING[self.compressor](packed[at : at + length], wanted + 1)  # never more than that
+            part = _UNPACKING[self.compressor](packed[at : at + length], wanted)
             if len(part) != wanted:
                 raise ValueError(f"a block of {len(part)} bytes in place of {wanted}")
             found += part
@@ -135,45 +132,24 @@ def _taken(data: memoryview, count: int) -> bytes:
 
 def _decoded(data: memoryview, count: int) -> bytes:
     """The first ``count`` bytes of what is base64."""
-    found = base64.b64decode(_taken(data, 4 * -(-count // 3)), validate=True)
-    if len(found) < count:
-        raise ValueError(f"{len(found)} bytes of {count}")
-    return found[:count]
+    return _taken(memoryview(base64.b64decode(_taken(data, 4 * -(-count // 3)), validate=True)), count)
 
 
-def _of_lz4(packed: bytes, most: int) -> bytes:
-    """A block of LZ4: runs of bytes as they are, each followed by a repetition of what was shortly before."""
-    found, at = bytearray(), 0
+def _of_lz4(packed: bytes, wanted: int) -> bytes:
+    import pyvista
+    from vtkmodules.vtkIOCore import vtkLZ4DataCompressor
 
-    def extended(length: int) -> int:
-        nonlocal at
-        if length == 15:
-            while packed[at] == 255:
-                length, at = length + 255, at + 1
-            length, at = length + packed[at], at + 1
-        return length
-
-    while at < len(packed):
-        token = packed[at]
-        at += 1
-        plain = extended(token >> 4)
-        found += packed[at : at + plain]
-        at += plain
-        if at >= len(packed):
-            break
-        back = int.from_bytes(packed[at : at + 2], "little")
-        at += 2
-        count = extended(token & 15) + 4
-        if not 0 < back <= len(found) or len(found) + count > most:
-            raise ValueError("a damaged block of LZ4")
-        before = bytes(found[-back:])
-        found += (before * (count // back + 1))[:count]
-    return bytes(found)
+    found = bytearray(min(wanted, 256 * len(packed)))  # no byte of LZ4 stands for more than 255
+    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
+        return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 
 
+# Bytes from a block that should have so many: never more than one byte more.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
-    "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most),
-    "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most),
+    "vtkZLibDataCompressor": lambda packed, wanted: zlib.decompressobj().decompress(packed, wanted + 1),
+    "vtkLZMADataCompressor": lambda packed, wanted: lzma.LZMADecompressor(memlimit=_MOST).decompress(
+        packed, wanted + 1
+    ),
     "vtkLZ4DataCompressor": _of_lz4,
 }
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
-from fem_reference.io.formats._vtk_cells import DataSet
-from fem_reference.io.soup import Lines, Soup, check_lines, joined, only_triangles
+from fem_reference.io.soup import DataSet, Lines, Soup, check_lines, joined, only_triangles
 
 _TRIANGLE = 5  # of VTK's cell types
 _NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
@@ -68,8 +67,7 @@ def read_points(path: Path) -> Any:
 
 def _data(path: Path) -> DataSet:
     """The data set of a VTK file."""
-    data = path.read_bytes()
-    return _vtk_legacy.read(data) if path.suffix.lower() == ".vtk" else _vtk_xml.read(data)
+    return (_vtk_legacy if path.suffix.lower() == ".vtk" else _vtk_xml).read(path.read_bytes())
 
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
