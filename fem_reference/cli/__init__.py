@@ -56,17 +56,12 @@ def main(arguments: list[str]) -> int:
         _check_outputs(options)
         _check_name(options.page_name)
         status: int = options.verb(options)
-    except (InputError, OSError) as error:
+    except (InputError, OSError, MissingSoftware) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except MissingSoftware as error:
-        print(f"fem-reference: {error}", file=sys.stderr)
-        return SOLVER_FAILED
+        return SOLVER_FAILED if isinstance(error, MissingSoftware) else BAD_INPUT
     except KeyboardInterrupt:
-        print(
-            "fem-reference: interrupted; what is stored stays, and a run of the reference goes on next time",
-            file=sys.stderr,
-        )
+        said = "interrupted; what is stored stays, and a run of the reference goes on next time"
+        print(f"fem-reference: {said}", file=sys.stderr)
         return INTERRUPTED
     except SystemExit:
         raise

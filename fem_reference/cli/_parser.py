@@ -97,24 +97,23 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        text = _help(name)
+        # What a verb is for is read from its file: to import it takes long.
+        assigned = [
+            node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)
+        ]
+        (text,) = (ast.literal_eval(one.value) for one in assigned if ast.unparse(one.targets[0]) == "HELP")
         sub = kinds.add_parser(name, help=text, description=text)
         if only in (None, name):
             _add(verb(name), sub)
     return whole
 
 
-def _help(name: str) -> str:
-    """The line that describes a verb, read from its file."""
-    assigned = [node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)]
-    texts = [ast.literal_eval(node.value) for node in assigned if ast.unparse(node.targets[0]) == "HELP"]
-    return str(*texts)
-
-
 def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     """The options of a verb."""
     sub.register("action", None, _Given)
-    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True, page_name=None)
+    sub.set_defaults(
+        verb=verb.run, ranks=None, error_bar=False, negative_control=False, limit=[], writes=True, page_name=None
+    )
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
     sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")

@@ -33,7 +33,13 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
     """Print ``text``, and write ``facts`` as JSON where that is wanted."""
     print(text)
     if options.json is not None:
+        write(options.json, json.dumps(facts, indent=1, allow_nan=False))
+
+
+def write(path: Path | None, text: str) -> None:
+    """Write a file that is wanted, below a folder that may be new."""
+    if path is not None:
         from fem_reference.io import files
 
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        files.write_text(options.json, json.dumps(facts, indent=1, allow_nan=False))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write_text(path, text)

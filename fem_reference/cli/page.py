@@ -6,8 +6,7 @@ from pathlib import Path
 
 from fem_reference import report
 from fem_reference.assessment.claims import Cover
-from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._pages import case_part, publish, status
+from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError

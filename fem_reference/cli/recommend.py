@@ -6,7 +6,7 @@ import re
 
 from fem_reference.assessment.judge import in_unit
 from fem_reference.assessment.recommendation import recommend
-from fem_reference.cli._choosing import scene_of
+from fem_reference.cli._cases import scene_of
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError

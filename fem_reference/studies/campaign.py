@@ -18,7 +18,7 @@ from pathlib import Path
 
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.runs import store as runs
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
@@ -64,12 +64,12 @@ class Made:
     @property
     def reached(self) -> Run | None:
         """The run, None where it did not reach all frames."""
-        return self.run if self.outcome.status == "converged" else None
+        return self.run if self.ended[0] == "converged" else None
 
     @property
-    def outcome(self) -> Outcome:
-        """The outcome of the run, ``"refused"`` where there is none."""
-        return self.run.outcome if self.run else Outcome("refused", self.failure)
+    def ended(self) -> tuple[str, str]:
+        """Status and message of the run, the status ``"refused"`` where there is none."""
+        return (self.run.outcome.status, self.run.outcome.message) if self.run else ("refused", self.failure)
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
@@ -153,7 +153,7 @@ def _result(future: Future[Path], trial: Trial) -> Run:
 
 
 def _log(one: Made, done: int, count: int, passed: float) -> None:
-    status = one.failure or one.outcome.status
+    status = one.failure or one.ended[0]
     left = f", about {passed / done * (count - done):.0f} s left" if done < count else ""
     log.info("run %d of %d: %s: %s%s", done, count, one.trial.label, status, left)
 

@@ -111,8 +111,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
         trial.knob,
         trial.value,
         choice | ({"scene": trial.changed} if trial.changed else {}),
-        one.outcome.status,
-        one.outcome.message,
+        *one.ended,
         errors={} if run is None else errors(run, truth, context),
         costs={} if run is None else costs(run),
     )

@@ -41,6 +41,11 @@ class Trial:
         """Its name in lines of progress."""
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
+    def varied(self, knob: str, value: str, **changes: Any) -> "Trial":
+        """The trial with ``changes`` of its fields, by a ``knob`` beside what was varied before."""
+        beside = f" ({self.knob} = {self.value})" if self.knob else ""
+        return replace(self, knob=knob, value=value + beside, **changes)
+
 
 def reference_trials(case: MuscleCase) -> Iterator[Trial]:
     """The reference of a case on other tetrahedra; and on coarse ones with each setting varied that its solver says trades
@@ -103,26 +108,26 @@ def _settings(base: Trial) -> Iterator[Trial]:
             if value not in (getattr(own, key), base.choice.settings.get(key)):
                 choice = base.choice.model_copy(update={key: value})
                 text = f"{value:.3g}" if isinstance(value, float) else str(value)
-                varied = replace(base, choice=choice, knob=key, value=text + _beside(base))
-                yield _with_other_volume(varied, text, base) if key == "element" else varied
+                yield _by_element(base, choice, text) if key == "element" else base.varied(key, text, choice=choice)
 
 
-def _with_other_volume(varied: Trial, text: str, base: Trial) -> Trial:
-    """The trial as it is where its element suits the effects; else the same energy of the volume with a pressure, or without."""
-    effects = list(varied.scene.effects)
+def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
+    """The trial by another element where that suits the effects; else the same energy of the volume with a pressure, or without."""
+    plain, effects = base.varied("element", text, choice=choice), list(base.scene.effects)
     found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
-    if _suits(varied.choice, varied.scene.effects) or len(found) != 1:
-        return varied
-    name, how = "incompressible_penalty", "a penalty"
-    if isinstance(found[0], IncompressiblePenalty):
-        name, how = "incompressible", "a pressure"
+    if len(found) != 1 or _suits(choice, base.scene.effects):
+        return plain
+    exact = isinstance(found[0], Incompressible)
+    name, how = ("incompressible_penalty", "a penalty") if exact else ("incompressible", "a pressure")
     i = effects.index(found[0])
     effects[i] = make(name, bulk=found[0].bulk)
-    if not _suits(varied.choice, tuple(effects)):
-        return varied
-    changed = varied.changed | {f"effect[{i}].name": name}
-    scene = varied.scene.model_copy(update={"effect": tuple(effects)})
-    return replace(varied, scene=scene, changed=changed, value=f"{text}, volume by {how}{_beside(base)}")
+    if not _suits(choice, tuple(effects)):
+        return plain
+    scene, changed = (
+        base.scene.model_copy(update={"effect": tuple(effects)}),
+        base.changed | {f"effect[{i}].name": name},
+    )
+    return base.varied("element", f"{text}, volume by {how}", choice=choice, scene=scene, changed=changed)
 
 
 def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
@@ -141,19 +146,10 @@ def _contact(base: Trial) -> Iterator[Trial]:
         return
     for factor in _STIFFNESSES:
         stiffness, key = factor * contact.stiffness, f"effect[{scene.effects.index(contact)}].stiffness"
-        stiffer = with_contact(scene, stiffness=stiffness)
-        yield _changed(base, stiffer, "contact stiffness", f"{stiffness:.3g} MPa/mm", key)
+        stiffer, text = with_contact(scene, stiffness=stiffness), f"{stiffness:.3g} MPa/mm"
+        yield base.varied("contact stiffness", text, scene=stiffer, changed=base.changed | {key: text})
     if known := [bone.distance_error for bone in scene.bone if bone.surface]:
         for factor in _DISTANCES:
             other, text = with_distances(scene, factor, "distance_error"), f"{factor * max(known):.3g} mm"
-            yield _changed(base, other, "error of distances to bones", text, "bone[*].distance_error")
-
-
-def _changed(base: Trial, case: MuscleCase, knob: str, value: str, key: str) -> Trial:
-    """The trial ``base`` with another value in its scene."""
-    return replace(base, scene=case, knob=knob, value=value + _beside(base), changed=base.changed | {key: value})
-
-
-def _beside(base: Trial) -> str:
-    """The difference of a trial from its case, before anything else is varied."""
-    return f" ({base.knob} = {base.value})" if base.knob else ""
+            changed = base.changed | {"bone[*].distance_error": text}
+            yield base.varied("error of distances to bones", text, scene=other, changed=changed)

@@ -180,16 +180,16 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
     for part, other in others:
         changed = {} if context is None or one.run is None else changes(other, one.run, context)
         predicted = _predicted(trial.scene, part) if takes_effects else {}
-        found.append(_omission(other, part.names, changes=changed, predicted=predicted))
+        found.append(replace(_omission(other, part.names), changes=changed, predicted=predicted))
     named = {name for part in parts(trial) for name in part.names}
     kept = tuple(name for name in there if name not in named)
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
 
 
-def _omission(one: Made, left_out: tuple[str, ...], **measured: dict[str, float]) -> Omission:
-    """The end of a run and its cost, beside what was ``measured`` on it."""
-    end = one.outcome
-    return Omission(left_out, end.status, end.message, costs=dict(end.cost), instead=one.trial.changed, **measured)
+def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
+    """The end of a run and its cost."""
+    costs = dict(one.run.outcome.cost) if one.run else {}
+    return Omission(left_out, *one.ended, costs=costs, instead=one.trial.changed)
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:

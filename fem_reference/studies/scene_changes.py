@@ -3,7 +3,6 @@
 import hashlib
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,11 +37,6 @@ def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
         for bone in case.bone
     )
     return case.model_copy(update={"bone": tuple(bones)})
-
-
-def with_reference(case: MuscleCase, **changes: Any) -> MuscleCase:
-    """The case with other settings of its reference."""
-    return case.model_copy(update={"reference": case.reference.model_copy(update=changes)})
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:

@@ -131,13 +131,16 @@ def rows(facts, metric, statistic):
 
 def test_main_job(tmp_path, monkeypatch) -> None:
     # With its mesh's refinement and its pictures, on a third of the tetrahedra; ``.ci/run`` runs it as it is shipped.
-    scene, target = casefile.read(MAIN_JOB, changes={"muscle.tet_size": "14 mm"}), tmp_path / "facts.json"
+    scene, target = (
+        casefile.read(MAIN_JOB, changes={"muscle.tet_size": "14 mm", "frames.every": 20}),
+        tmp_path / "facts.json",
+    )
     monkeypatch.setattr(casefile, "read", lambda _: scene)
     status = cli.main(["demo", "--out", str(tmp_path), "--json", str(target), "--quiet"])
     facts = json.loads(target.read_text())
     assert (status, facts["verdict"] in MET, facts["status"]) == (cli.DONE, True, "converged")
     frames = {row["frame"] for row in facts["measures"] if row["candidate"] == "pbd"}
-    assert frames == set(range(0, 201, 10))
+    assert frames == set(range(0, 201, 20))
     metrics = {row["metric"] for row in facts["measures"] if row["candidate"] == "pbd"}
     surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
     assert metrics == surface | {"fibre_length", "penetration"}
@@ -145,6 +148,7 @@ def test_main_job(tmp_path, monkeypatch) -> None:
     assert page.count('src="data:image/webp') >= 4, "the pictures are missing"
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_page")
 def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
     target, recorded = tmp_path / "facts.json", data / "candidates" / "report_pbd_gluteus_maximus"

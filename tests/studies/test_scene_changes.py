@@ -13,14 +13,7 @@ from fem_reference.problems import muscle
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.scene_changes import (
-    nearest_vertices,
-    on_tetrahedra,
-    resample,
-    with_contact,
-    with_distances,
-    with_reference,
-)
+from fem_reference.studies.scene_changes import nearest_vertices, on_tetrahedra, resample, with_contact, with_distances
 
 
 @pytest.fixture
@@ -36,7 +29,6 @@ def test_only_what_is_named_changes(scene: MuscleCase) -> None:
     stiffer = with_contact(scene, stiffness=0.4)
     assert among(stiffer.effects).stiffness == 0.4
     assert stiffer.effects[:-1] == scene.effects[:-1]
-    assert with_reference(scene, first_step=0.5).reference.settings["first_step"] == 0.5
     halved = with_distances(scene, 0.5, "distance_error")
     assert [bone.distance_error for bone in halved.bone] == [0.5 * bone.distance_error for bone in scene.bone]
     assert [bone.distance_rounding for bone in halved.bone] == [bone.distance_rounding for bone in scene.bone]

@@ -64,7 +64,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
     before, body.system.contact = np.array(body.unknowns.x.array), body.contact
-    direction, size = _lowest(body, body.stability.pressures), share * diagonal(body.nodes.cells.points)
+    direction, size = _lowest(body, body.stability.pressures), share * diagonal(body.nodal.cells.points)
     for amount in (sign * larger * size for larger in _LARGER for sign in (1, -1)):
         body.unknowns.x.array[:] = before + amount * direction
         body.unknowns.x.scatter_forward()
