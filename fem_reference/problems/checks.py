@@ -251,7 +251,7 @@ def _shared(mesh: Cells, one: str, other: str) -> Floats:
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:
-        facets = np.sort(mesh.facets[name], axis=1)
+        facets = np.sort(mesh.facets[name].astype(np.int64), axis=1)  # a product of two indices may need it
         pairs = facets[:, list(combinations(range(facets.shape[1]), 2))]
         return np.asarray(pairs[..., 0] * count + pairs[..., 1])
 
