@@ -1,4 +1,4 @@
-"""Contact with bones: the obstacles of a body, and the law of the contact pressure."""
+"""Contact with bones: the bones around a body, and the law of the contact pressure."""
 
 import logging
 from collections.abc import Callable, Mapping

@@ -1,12 +1,12 @@
-"""Stops of load steps between frames, so that none leaves out what happens within it, whatever the frames.
+"""Frame numbers at which load steps end, so that no step skips motion, whatever the frames.
 
-Between two stops nothing that is prescribed, and no bone, turns by more than a right angle, from half a turn on the straight
-line between two poses no longer shows the direction; nothing goes farther, apart from what all do alike, than the body is
-long; and nothing goes there and back, but for a fifteenth of that distance and a hundredth of the body's size.
+Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight line
+between two poses loses the direction), goes farther than the body is long, apart from the motion that all share, or goes there
+and back by more than a fifteenth of that distance and a hundredth of the body's size.
 
-Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``turning``), so
-that this holds whatever they are. Any other function of a frame number is sampled 1024 times over all frames, 16 times between
-two of them at least, and again between where it moves far: what it does within less is not seen.
+Motions and paths of this package state the frames at which they bend and the angles by which they turn between (``turning``), so
+that this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times
+between two of them, and again where it moves far: faster motion is not seen.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ class Moving:
 
 def turning(path: object, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
-    has turned by at each; None of one that says none.
+    has turned by at each; None where the path does not state them.
     """
     owner = getattr(path, "__self__", path)  # of a method
     if not type(owner).__module__.startswith("fem_reference."):

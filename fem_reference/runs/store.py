@@ -167,10 +167,8 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
         found = [getattr(state, name) for state in states]
         return np.stack(found) if found and all(one is not None for one in found) else None
 
-    positions, of_case = (
-        stacked("surface"),
-        all(state.surface is not None or state.field is not None for state in states),
-    )
+    positions = stacked("surface")
+    of_case = all(state.surface is not None or state.field is not None for state in states)
     names = set.intersection(*(set(state.scalars) for state in states)) if states else set()
     nodal = [state.field for state in states if state.field is not None]
     return Run(
@@ -197,14 +195,14 @@ def load(folder: Path) -> Run:
     if isinstance(state, dict) and state.get("status") == "running":
         raise InputError(f"{place}: status", '"running"', "a run that came to its end")
     stored = parse(Contents, state, f"{place}: run")
-    whose: dict[str, Any] = {"name": stored.name, "solver": stored.solver, "numbers": stored.numbers, "folder": folder}
-    whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
+    outcome = Outcome(stored.status, stored.message, stored.cost)
     scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}
-    whose |= {"scalars": scalars, "residuals": stored.residuals}
+    run = Run(stored.name, stored.solver, outcome, stored.numbers, scalars=scalars, residuals=stored.residuals)
+    run = replace(run, folder=folder, origin=state["origin"])
     if FIELD in stored.parts:
         mesh, arrays = read_field(folder, stored.numbers)
-        return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)
-    return Run(**whose, **_moved(folder, stored.numbers, stored.parts))
+        return replace(run, has_surface=False, mesh=mesh, fields=arrays)
+    return replace(run, **_moved(folder, stored.numbers, stored.parts))
 
 
 def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:

@@ -27,9 +27,9 @@ DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
 
-# What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
+# Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
 Standard = Literal["reference", "exact", "itself"]
-# What a run has that can be measured.
+# Parts of a run that can be measured.
 Part = Literal["surface", "lines", "field"]
 
 
