@@ -67,7 +67,8 @@ def read_points(path: Path) -> Any:
 
 def _data(path: Path) -> DataSet:
     """The data set of a VTK file."""
-    return (_vtk_legacy if path.suffix.lower() == ".vtk" else _vtk_xml).read(path.read_bytes())
+    read = _vtk_legacy.read if path.suffix.lower() == ".vtk" else _vtk_xml.read
+    return read(path.read_bytes())
 
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
