@@ -24,10 +24,9 @@ from fem_reference.foundations.mesh import (
     triangle_areas,
 )
 from fem_reference.geometry.clearance import Clearance, of_spline
-from fem_reference.geometry.distance import distances
-from fem_reference.geometry.kept_arrays import kept
+from fem_reference.geometry.distance import distances, inside
+from fem_reference.geometry.kept_meshes import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
-from fem_reference.geometry.windings import inside
 
 # The distance [mm] outside a grid: far away from everything, but finite.
 FAR = 1e6

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.foundations import scratch, subprocesses
+from fem_reference.foundations import subprocesses
 from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import (
     TET_FACES,
@@ -175,7 +175,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 def run(mesher: str, surface: Surface, size: float) -> TetMesh:
     """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError where it crashes or takes too long."""
-    with scratch.folder() as folder:
+    with subprocesses.scratch_folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
         try:

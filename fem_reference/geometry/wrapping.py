@@ -6,7 +6,6 @@ Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/1
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -59,18 +58,6 @@ class Paths:
         return np.asarray(middles + height + climb + turned)
 
 
-class WrappingSurface(Protocol):
-    """A surface that paths go around."""
-
-    def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) [mm] inside the surface; negative outside."""
-        ...
-
-    def around(self, starts: Floats, ends: Floats) -> Paths:
-        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]; points inside count as on the surface."""
-        ...
-
-
 @dataclass(frozen=True)
 class WrappingSphere:
     """A ball of ``radius`` about ``centre`` [mm]."""
@@ -79,11 +66,13 @@ class WrappingSphere:
     radius: float
 
     def depths(self, points: Floats) -> Floats:
-        """``radius - |x - centre|``."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the ball; negative outside."""
         return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """Along the great circle through both points; where they are opposite each other, one of them."""
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along the great circle through both, or one of them
+        where they are opposite each other; points inside count as on the surface.
+        """
         normals = np.cross(starts - self.centre, ends - self.centre)
         return _around(
             starts, ends, np.asarray(self.centre), _perpendicular(normals, starts - self.centre), self.radius
@@ -99,11 +88,11 @@ class WrappingCylinder:
     radius: float
 
     def depths(self, points: Floats) -> Floats:
-        """``radius`` minus the distance from the axis."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the cylinder; negative outside."""
         return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """Along a helix, the shorter path round."""
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along a helix; points inside count as on it."""
         axis = self._unit()
         one, other = (_across(points - self.point, axis) for points in (starts, ends))
         senses = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)
