@@ -55,8 +55,7 @@ from fem_reference.problems.contact import (
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.scenes.bones import CaseBone
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.
 RELAXING = 10

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import Delaunay, QhullError
 
 from fem_reference.effects import FieldEffect
 from fem_reference.effects.advection import Advection
@@ -17,9 +18,8 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import join
 from fem_reference.geometry.field_mesh import FieldMesh, check, refined, share_above, stabilisation
 from fem_reference.io import files
-from fem_reference.problems import domain
 from fem_reference.problems.problem import NOTHING, AtRest, Task
-from fem_reference.scenes.scalar import Boundary, ScalarCase
+from fem_reference.scenes.scalar import Boundary, MeshFiles, ScalarCase
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,10 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """A scalar field to be solved.
-
-    ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices, then for order 2 the middles of
-    ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y; ``tau`` (m,) of the stabilised
-    form, None for the plain one; ``peclet`` the greatest mesh Peclet number; ``exact`` the formula of the solution where known.
+    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices,
+    then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
+    ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the greatest mesh Peclet number; ``exact`` the formula
+    of the solution where known.
     """
 
     mesh: FieldMesh
@@ -64,8 +63,8 @@ class FieldProblem:
 
     def write_meshes(self, folder: Path) -> None:
         """Write the mesh, with the values that are fixed, into ``folder``, for ParaView."""
-        shown = {"fixed": self.fixed[: len(self.mesh.points)]}
-        files.write_field(folder / "mesh.vtu", self.mesh.points, self.mesh.cells, shown)
+        points, cells = self.mesh.points, self.mesh.cells
+        files.write_field(folder / "mesh.vtu", points, cells, {"fixed": self.fixed[: len(points)]})
 
     @property
     def form(self) -> str:
@@ -90,27 +89,28 @@ class FieldProblem:
 
 def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
     """The problem of a case, its mesh refined so many times; InputError names what is not usable."""
-    mesh = check(domain.mesh_of(case))
+    mesh = check(mesh_of(case))
+    dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
-    average = float(mesh.points[:, 1].mean()) if mesh.points.shape[1] > 1 else 0.0
+    average = float(mesh.points[:, 1].mean()) if dimension > 1 else 0.0
     given = _given(case, mesh)
     for _ in range(refinements):
         given = np.concatenate([given, _between(mesh, given)])
         mesh = refined(mesh)
-    velocity = next((effect.velocity for effect in case.effects if isinstance(effect, Advection)), None)
+    flow = next((effect.velocity for effect in case.effects if isinstance(effect, Advection)), (0.0,) * dimension)
     diffusion = next(effect.coefficient for effect in case.effects if isinstance(effect, Diffusion))
-    flow = np.zeros(mesh.points.shape[1]) if velocity is None else np.array(velocity)
-    peclet, tau = stabilisation(mesh, diffusion, flow, case.element.order)
-    form = case.element.form
-    fixed = _fixed(case, mesh, given)
-    _check_unique(case, fixed)
+    peclet, tau = stabilisation(mesh, diffusion, np.array(flow), case.element.order)
+    form, fixed = case.element.form, _fixed(case, mesh, given)
+    if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
+        place = join(case.place, "boundary")  # a constant can be added to the solution
+        raise InputError(place, "no value anywhere and no reaction", "a value somewhere, or a reaction")
     return FieldProblem(
         mesh,
         case.element.order,
         case.effects,
         fixed,
         tuple(Flux(_facets(entry, mesh), entry.slope) for entry in case.boundary if entry.slope is not None),
-        share_above(mesh, average) if mesh.points.shape[1] > 1 else np.zeros(len(mesh.cells)),
+        share_above(mesh, average) if dimension > 1 else np.zeros(len(mesh.cells)),
         tau if form == "supg" or (form == "auto" and peclet > 1) else None,
         peclet,
         case.exact,
@@ -163,12 +163,13 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
     for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
             path = case.file(entry.bounds, f"boundary[{i}].bounds")
-            table = domain.numbers(path)
+            table = numbers(path)
             if len(table) != 2:
                 raise InputError(path, f"{len(table)} rows", "2: vertices, and values")
-            vertices = domain.whole_numbers(path, table[0]) - 1
-            if vertices.min() < 0 or vertices.max() >= len(values):
-                raise InputError(path, f"vertices {vertices.min() + 1} to {vertices.max() + 1}", f"1 to {len(values)}")
+            vertices = whole_numbers(path, table[0]) - 1
+            low, high = vertices.min() + 1, vertices.max() + 1
+            if low < 1 or high > len(values):
+                raise InputError(path, f"vertices {low} to {high}", f"1 to {len(values)}")
             if len(np.unique(vertices)) < len(vertices):
                 raise InputError(path, "a vertex named twice", "one value for each vertex")
             if (np.abs(values[vertices] - table[1]) > 0).any():
@@ -189,7 +190,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
 
 def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
     """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
-    fixed = given if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
+    fixed = np.array(given) if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(case.boundary):
         place = join(case.place, f"boundary[{i}]")
@@ -214,7 +215,6 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
             if len(clash):
                 got = f"{values[clash[0]]:g} where another condition has {fixed[which][clash[0]]:g}"
                 raise InputError(f"{place}.value", got, "one value for each node")
-            fixed = fixed.copy()
             fixed[which] = values
     return fixed
 
@@ -239,8 +239,62 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
     return np.concatenate([vertices, len(mesh.points) + mesh.edge_numbers(facets)])
 
 
-def _check_unique(case: ScalarCase, fixed: Floats) -> None:
-    """InputError where a constant can be added to the solution."""
-    if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
-        place = join(case.place, "boundary")
-        raise InputError(place, "no value anywhere and no reaction", "a value somewhere, or a reaction")
+def mesh_of(case: ScalarCase) -> FieldMesh:
+    """The mesh of a scalar case; InputError names what is unusable."""
+    domain = case.domain
+    if domain.mesh is not None:
+        return _mesh_files(case, domain.mesh)
+    if domain.surface is not None:
+        surface = files.read_surface(case.file(domain.surface.file, "domain.surface.file"), domain.surface.scale)
+        return FieldMesh(surface.points, surface.triangles, surface.place)
+    interval, nodes = domain.interval, np.array(domain.nodes)
+    if interval is not None and interval.seed is None:
+        nodes = np.linspace(interval.start, interval.end, interval.count)
+    elif interval is not None:
+        inside = np.random.default_rng(interval.seed).uniform(interval.start, interval.end, interval.count - 2)
+        nodes = np.array([interval.start, *np.sort(inside), interval.end])
+    vertices = np.arange(len(nodes))
+    return FieldMesh(nodes[:, None], np.column_stack([vertices[:-1], vertices[1:]]), join(case.place, "domain"))
+
+
+def _mesh_files(case: ScalarCase, given: MeshFiles) -> FieldMesh:
+    path = case.file(given.points, "domain.mesh.points")
+    points = numbers(path)
+    if points.shape[1] not in (2, 3):
+        raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates a vertex")
+    if given.triangles == "delaunay":
+        if points.shape[1] == 3:
+            raise InputError(join(case.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
+        try:
+            return FieldMesh(points, Delaunay(points).simplices, str(path))
+        except QhullError as error:
+            want = "points in the plane, not on a line"
+            raise InputError(path, "points that cannot be triangulated", want) from error
+    path = case.file(given.triangles, "domain.mesh.triangles")
+    triangles = whole_numbers(path, numbers(path))
+    if triangles.shape[1] != 3:
+        raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices a triangle")
+    return FieldMesh(points, triangles - 1, str(path))
+
+
+def numbers(path: Path) -> Floats:
+    """The comma-separated numbers of a file as a table."""
+    rows = files.read_rows(path)
+    for i, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise InputError(path, f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
+    try:
+        table = np.array([[float(cell) for cell in row] for row in rows])
+    except ValueError as error:
+        raise InputError(path, str(error), "numbers") from error
+    if table.ndim != 2 or not np.isfinite(table).all():
+        raise InputError(path, "an empty table or a number that is not finite", "rows of finite numbers")
+    return table
+
+
+def whole_numbers(path: Path, values: Floats) -> Ints:
+    """``values`` of a file as numbers of vertices; InputError where they are none."""
+    wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
+    if wrong.any():
+        raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")
+    return np.asarray(values.astype(np.int64))

@@ -20,7 +20,7 @@ from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSph
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.scenes import bones
+from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.solvers.common.state_checks import Trouble
@@ -36,13 +36,13 @@ class Via(Record):
     bone: str
 
 
-class SphereOn(bones.CaseSphere):
+class SphereOn(CaseSphere):
     """A sphere, given at rest, that moves with a ``bone``."""
 
     bone: str
 
 
-class CylinderOn(bones.Rod):
+class CylinderOn(Rod):
     """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
 
     bone: str

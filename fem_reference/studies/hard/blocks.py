@@ -20,7 +20,7 @@ from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import MuscleProblem, solid, spring_skins
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.scenes.bones import CaseBone
+from fem_reference.scenes.muscle import CaseBone
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.

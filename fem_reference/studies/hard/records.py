@@ -17,9 +17,8 @@ from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
 from fem_reference.scenes import casefile
-from fem_reference.scenes.bones import CaseBone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
-from fem_reference.scenes.muscle import Frames
+from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
