@@ -38,10 +38,8 @@ def distances(points: Floats, surface: Surface) -> Distances:
     squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
     lost = ~np.isfinite(squares)  # libigl's results are arbitrary where squares overflow
     triangle[lost], closest[lost] = 0, vertices[triangles[0, 0]]
-    corners = surface.points[surface.triangles[triangle]]
-    return Distances(
-        np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, _barycentric(closest, corners)
-    )
+    inner = _barycentric(closest, surface.points[surface.triangles[triangle]])
+    return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, inner)
 
 
 # A surface is often queried for few points at a time, and building its tree takes as long as thousands of them.

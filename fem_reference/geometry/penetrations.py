@@ -84,8 +84,6 @@ def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floa
 
 @lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
-    """A vertex of each part of a surface of ``triangles``, 64 bit integers: without a crossing, its side is that of the whole
-    part.
-    """
+    """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
     parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
     return np.unique(parts, return_index=True)[1]

@@ -47,12 +47,7 @@ class Paths:
 
     def _on_surface(self, which: Ints, share: Floats) -> Floats:
         """The points (m, 3) after ``share`` (m,) of the path along the surface."""
-        first, last, axes, middles = (
-            self.touches[0][which],
-            self.touches[1][which],
-            self.axes[which],
-            self.middles[which],
-        )
+        first, last, axes, middles = (values[which] for values in (*self.touches, self.axes, self.middles))
         height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
         turned = _turned(first - middles - height, axes, share * self.turns[which])
         return np.asarray(middles + height + climb + turned)
@@ -73,10 +68,9 @@ class WrappingSphere:
         """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along the great circle through both, or one of them
         where they are opposite each other; points inside count as on the surface.
         """
-        normals = np.cross(starts - self.centre, ends - self.centre)
-        return _around(
-            starts, ends, np.asarray(self.centre), _perpendicular(normals, starts - self.centre), self.radius
-        )
+        arms = starts - self.centre
+        axes = _perpendicular(np.cross(arms, ends - self.centre), arms)
+        return _around(starts, ends, np.asarray(self.centre), axes, self.radius)
 
 
 @dataclass(frozen=True)
