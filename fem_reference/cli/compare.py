@@ -6,9 +6,9 @@ from pathlib import Path
 from fem_reference import solvers
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
+from fem_reference.cli import DONE, SOLVER_FAILED, write_output
 from fem_reference.cli._cases import asked, candidates, checked_bench, choose, compared, publish, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
 from fem_reference.report.asked import Part

@@ -43,9 +43,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run that ``ended`` so, under the name that it has here; None where there is none, other packages made it, or
-        it lacks states that the settings ask for.
-        """
+        """The stored run that ``ended`` so; None without one, by other packages, or where it lacks states that are wanted."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -101,9 +99,7 @@ def _stop_for(found: Sequence[Decision]) -> None:
 
 
 def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
-    """Solve, with each frame written as it is reached, and the cost of all; ``watch`` sees each frame, and may stop the run. A run
-    that failed before its first frame has the state at rest.
-    """
+    """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state."""
 
     def add(frame: Frame) -> None:
         writer.add(frame)

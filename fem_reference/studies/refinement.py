@@ -28,7 +28,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.scene_changes import on_tetrahedra, with_contact, with_distances, without_states
+from fem_reference.studies.variations import on_tetrahedra, with_contact, with_distances, without_states
 
 log = logging.getLogger(__name__)
 
@@ -96,9 +96,7 @@ def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars
 
 
 def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | None:
-    """New error bars where they were ``asked`` for; else those that are stored, or new ones where they cost less than a fifth of
-    the reference, or None, as of a run that did not converge or has no interior.
-    """
+    """Error bars: new ones where ``asked`` for; else stored ones, or new ones that cost less than a fifth of the reference."""
     if asked:
         return obtain(bench, reference)
     found = stored(reference)

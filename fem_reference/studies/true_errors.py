@@ -52,9 +52,7 @@ def _of(case: MuscleCase, store: Path) -> list[Claim]:
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
-    """The claims of the ``bars`` of the first of two runs about its change from rest and about deviations from it; the second is a
-    sharper solution.
-    """
+    """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is a sharper solution."""
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
     surfaces = [replace(one, fibres=None, fibre_positions=None) for one in runs]  # as candidates are

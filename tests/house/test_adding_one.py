@@ -185,7 +185,7 @@ VERB = '''
 
 import argparse
 
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, write_output
 from fem_reference.scenes import casefile
 
 HELP = "how many cases there are"
