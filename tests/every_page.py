@@ -12,6 +12,7 @@ from fem_reference.report import (
     against_page,
     claims_page,
     effects_page,
+    estimation_page,
     field_page,
     index_page,
     ranking_page,
@@ -23,8 +24,8 @@ from tests.assessment import test_versions
 from tests.report import entries as made_entries
 from tests.report import examples as scalar_examples
 from tests.report import test_study_page
+from tests.studies import test_estimation, test_table_5_1
 from tests.studies import test_omissions as test_effects_verb
-from tests.studies import test_table_5_1
 from tests.studies import test_true_errors as test_claims
 
 KINDS = (
@@ -38,6 +39,7 @@ KINDS = (
     "claims",
     "effects",
     "stress",
+    "estimation",
     "versions",
     "index",
 )
@@ -66,6 +68,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
         "error-bars": ("page", claims_page.page(known)),
         "effects": ("effects", effects_page.page(test_effects_verb.found())),
         "stress": ("stress", stress_page.page(stress(comparison))),
+        "estimation": ("page", estimation_page.page(test_estimation.found())),
     }
     paths = [
         report.write(report.of_comparison(one), folder / name, report.NAME, f"fem-reference compare {name}")

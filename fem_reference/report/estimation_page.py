@@ -19,7 +19,12 @@ _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]]
 
 def page(found: Estimation) -> Page:
     """The page of the errors of estimation techniques."""
-    contents = {"found": found, "techniques": TECHNIQUES, "fibres": by_fibres(found), "drawings": [_figure(), _curves(found), _fits(found)]}
+    contents = {
+        "found": found,
+        "techniques": TECHNIQUES,
+        "fibres": by_fibres(found),
+        "drawings": [_figure(), _curves(found), _fits(found)],
+    }
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
     )
@@ -46,7 +51,7 @@ def facts(found: Estimation) -> dict[str, Any]:
     return {**rows, "missing": found.missing}
 
 
-def _style(i: int) -> dict[str, str]:
+def _style(i: int) -> dict[str, Any]:
     """The look of the i-th technique."""
     return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
 
