@@ -11,7 +11,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
-from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.sectors import attached_shares
@@ -52,6 +52,10 @@ class Bone:
     def pose(self, frame: float) -> Floats:
         """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
+
+    def distances(self, frame: float, points: Floats) -> Floats:
+        """Distance (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
+        return self.shape.sample(apply(np.linalg.inv(self.pose(frame)), points)).distance
 
 
 @dataclass(frozen=True, eq=False)
