@@ -26,8 +26,7 @@ from fem_reference.metrics import (
 )
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case, Expectation
 
 

@@ -18,7 +18,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers, carry_out
-from fem_reference.studies.ladders import Trial
+from fem_reference.studies.variations import Trial
 
 pytestmark = pytest.mark.slow
 ONLY = ("pbd",)

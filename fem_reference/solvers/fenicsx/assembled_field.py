@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.effects import FieldState, Place
 from fem_reference.foundations.formula import FUNCTIONS, evaluate
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
@@ -19,7 +19,7 @@ import ufl  # isort: skip
 from dolfinx import fem, mesh  # isort: skip
 from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, set_bc  # isort: skip
 from mpi4py import MPI  # isort: skip
-from fem_reference.solvers.fenicsx import compiling  # isort: skip
+from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
 QUADRATURE_DEGREE = 8  # as in scikit_fem, and on the boundary the same rule of 3 points
 FACET_DEGREE = 5
@@ -39,9 +39,9 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
     dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": QUADRATURE_DEGREE})
     # The zero makes a right-hand side even without sources.
     residual = weak * dx - fem.Constant(msh, 0.0) * test.value * dx
-    for i, slope_measure in enumerate(_flux_measures(msh, problem)):
-        slope = evaluate(problem.fluxes[i].slope, place.position, functions)
-        residual -= problem.diffusion * slope * test.value * slope_measure
+    ds = meshes.facet_measure(msh, meshes.local_facets(msh, [flux.facets for flux in problem.fluxes]), FACET_DEGREE)
+    for i, flux in enumerate(problem.fluxes):
+        residual -= problem.diffusion * evaluate(flux.slope, place.position, functions) * test.value * ds(i)
     left, right = ufl.system(residual)
     return compiling.form(left), compiling.form(right), space, nodes(space, problem)
 
@@ -101,24 +101,6 @@ def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
     function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
     function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
     return function
-
-
-def _flux_measures(msh: mesh.Mesh, problem: FieldProblem) -> list[Any]:
-    """One measure per flux, over its facets."""
-    boundary = msh.topology.dim - 1
-    for start, end in ((boundary, boundary + 1), (boundary + 1, boundary), (boundary, 0), (0, boundary + 1)):
-        msh.topology.create_connectivity(start, end)
-    exterior = mesh.exterior_facet_indices(msh.topology)
-    corners = mesh.entities_to_geometry(msh, boundary, exterior)
-    original = np.sort(np.asarray(msh.geometry.input_global_indices)[corners], axis=1).tolist()
-    parts = []
-    for i, flux in enumerate(problem.fluxes):
-        wanted = {tuple(facet) for facet in np.sort(flux.facets, axis=1).tolist()}
-        chosen = exterior[np.array([tuple(facet) in wanted for facet in original], bool)]
-        kind = fem.IntegralType.exterior_facet
-        parts.append((i, fem.compute_integration_domains(kind, msh.topology, chosen)))
-    ds = ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": FACET_DEGREE})
-    return [ds(i) for i, _ in parts]
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:

@@ -13,8 +13,9 @@ from petsc4py import PETSc
 
 from fem_reference.effects import Effect, Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.runs.states import NodalState
+from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
@@ -28,26 +29,13 @@ from fem_reference.solvers.fenicsx.multigrid import Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Path, settle
+from fem_reference.solvers.fenicsx.reference_cells import Displacement
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
-from fem_reference.solvers.fenicsx.tabulated import Displacement
 from fem_reference.solvers.fenicsx.validity import Validity
-
-
-class FiniteEnergy:
-    """Checks that the ``energy`` of a state is a number."""
-
-    def __init__(self, energy: Callable[[], float]) -> None:
-        self.energy = energy
-
-    def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where a law has no value."""
-        if np.isfinite(self.energy()):
-            return None
-        return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
 
 
 class AssembledBody:
@@ -60,7 +48,8 @@ class AssembledBody:
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
         self.cells = meshes.own_cells(self.mesh)
-        self.local = {int(cell): i for i, cell in enumerate(self.cells)}
+        self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
+        self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
@@ -77,37 +66,36 @@ class AssembledBody:
         self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
-        self.contact = self.system.contact = self._contact(body, form) if body.contact else None
+        self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
         self.system.balance_units()
         self.path = Path(self.system, self.determinants)
-        inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, FiniteEnergy(self.energy)
+        inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, self
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
         self.at = body.frames[0]  # the frame of the last good state
-        self.nodes = meshes.Nodes(body.mesh, self.cells, self.displacement)
-        stored = self.cells, settings.element, self.displacement, self.clock
-        self.nodal = Nodal(*stored) if settings.store_state else None
+        self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock)
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         """The condition of ``entry`` on this rank's unknowns."""
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
-        parents = self.displacement.dofs.ravel()
-        points = contact_points.on_skin(self.displacement.space, parents, entry.on, self.local)
-        return PointSprings(self.unknowns, entry, points)
+        return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
 
-    def _contact(self, body: Body, form: forms.Form) -> ContactForces:
+    def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
         """The contact of bones with this rank's points."""
-        law, space, parents = body.contact, self.displacement.space, self.displacement.dofs.ravel()
-        assert law is not None  # called only where there is a law
         if isinstance(law.on, str):
-            facets = form.regions[law.on]
-            points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
+            points = contact_points.on_facets(self.displacement, body.mesh, form.regions[law.on], form.degree)
         else:
-            points = contact_points.on_skin(space, parents, law.on, self.local)
+            points = contact_points.on_skin(self.displacement, law.on, self.local)
         return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
+
+    def trouble(self, _: Floats, /) -> Trouble | None:
+        """Diverged where the energy has no value in the present state."""
+        if np.isfinite(self.energy()):
+            return None
+        return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes at ``moved`` of the rest points (n, 3) [mm]."""
@@ -169,13 +157,17 @@ class AssembledBody:
             self.contact.update(frame)
         proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
         if not proved:
-            self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.settle() if proved else self.contact.go_back()
-        if proved:
-            self.at = frame
-            self.path.settle(self.energy(), connected=False)
+            self.go_back(before)
+        else:
+            self.arrive(frame)
         return proved
+
+    def arrive(self, frame: float) -> None:
+        """Take the present state as that of ``frame``; no load step led to it."""
+        self.at = frame
+        if self.contact:
+            self.contact.settle()
+        self.path.settle(self.energy(), connected=False)
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
         """Register ``frame`` as solved earlier, with ``unknowns`` (n,) and negative ``modes``."""
@@ -187,11 +179,9 @@ class AssembledBody:
         """Take up the state of ``frame`` with ``unknowns`` (n,), as if it was just reached."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
-        self.at = frame
         if self.contact:
             self.contact.update(frame)
-            self.contact.settle()
-        self.path.settle(self.energy(), connected=False)
+        self.arrive(frame)
         if not recalled and self.stability is not None:  # an old factorisation remains in use
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
@@ -237,8 +227,7 @@ class AssembledBody:
         if self.stability is not None:
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 modes = self.stability.negative_modes()
-        if self.reuse and not self.clock.matters:
-            self.known.add(KnownState(self._acting(frame), np.array(self.unknowns.x.array), modes))
+        self.know(frame, np.array(self.unknowns.x.array), modes)
         self.modes = modes
         return modes
 
@@ -257,24 +246,12 @@ class AssembledBody:
         """A compiled form, summed over the ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
-    def node_positions(self) -> Floats:
-        """The present positions (n, 3) [mm] of the nodes of the body's mesh."""
-        return self.nodes.positions()
-
-    def state(self) -> NodalState | None:
-        """The unknowns of every cell; None where they were not requested."""
-        return None if self.nodal is None else self.nodal.state()
-
     def positions(self, cells: Ints, points: Floats) -> Floats:
         """The present positions (n, 3) [mm] of rest ``points`` (n, 3), each in a cell of ``cells`` (n,); on every rank."""
-        displacement = fem.Function(self.displacement.space)
-        displacement.x.array[:] = self.unknowns.x.array[self.displacement.dofs.ravel()]
-        mine = np.array([i for i, cell in enumerate(cells) if int(cell) in self.local], dtype=np.int64)
-        local = np.array([self.local[int(cells[i])] for i in mine], dtype=np.int32)
-        moved = points[mine] + displacement.eval(points[mine], local).reshape(-1, 3) if len(mine) else points[mine]
-        result = np.empty_like(points)
-        for indices, values in self.comm.allgather((mine, moved)):
-            result[indices] = values
+        mine, result = np.flatnonzero(self.local[cells] >= 0), np.empty_like(points)
+        carried = contact_points.on_skin(self.displacement, Skin(cells, points, np.zeros(len(cells))), self.local)
+        for indices, moved in self.comm.allgather((mine, carried.positions(self.unknowns.x.array))):
+            result[indices] = moved
         return result
 
 

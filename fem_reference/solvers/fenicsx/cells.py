@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import basix
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, eye_array
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, is_stabilised
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form
+from fem_reference.solvers.fenicsx.reference_cells import lagrange
 
 _CHUNK = 256  # cells
 _FIELDS = ("weights", "shape", "slopes", "values", "pressures")
@@ -73,14 +73,10 @@ class CellSums:
 
     def structure(self) -> Structure:
         """The sparsity of the cells' entries, with the whole diagonal."""
-        rows = np.repeat(np.arange(self.count), self.unknowns.shape[1])
-        has = csr_array(
-            (np.ones(len(rows), bool), (rows, self.unknowns.ravel())), shape=(self.count, self.size), dtype=bool
-        )
-        diagonal = csr_array(
-            (np.ones(self.size, bool), (np.arange(self.size), np.arange(self.size))), shape=(self.size, self.size)
-        )
-        found = csr_array(has.T @ has + diagonal)
+        starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
+        entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
+        has = csr_array(entries, shape=(self.count, self.size))
+        found = csr_array(has.T @ has + eye_array(self.size, dtype=bool))
         found.sort_indices()
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
@@ -97,19 +93,36 @@ class CellSums:
         )
         return found
 
-    def add_residual(self, residual: Floats) -> None:
-        """Add the forces of cells to ``residual`` (n,) over this rank's unknowns, ghosts too."""
-        for some in self._chunks():
-            self._add(self.form.derivatives.first, some, residual)
-        self._stabilise(residual)
-
-    def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None, *, pointwise: bool = False) -> None:
-        """Add the tangent to ``into`` and the forces to ``residual``, with their first-order change by ``moves`` (n,) of the
-        displacement, where given. ``pointwise``: the pressure follows the volume at every point and is no unknown of its own.
+    def add(
+        self, residual: Floats, into: Tangent | None = None, moves: Floats | None = None, *, pointwise: bool = False
+    ) -> None:
+        """Add the forces of cells to ``residual`` (n,) over this rank's unknowns, ghosts too. Where a tangent is given, add theirs
+        ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if any. ``pointwise``: the
+        pressure follows the volume at every point and is no unknown of its own.
         """
+        given = self.form.derivatives.first if into is None else self.form.derivatives.second
         for some in self._chunks():
-            self._add(self.form.derivatives.second, some, residual, into, moves, pointwise=pointwise)
-        self._stabilise(residual, into)
+            values = given.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+            values = _without_pressure(values, 3 * self.form.kinds) if pointwise else values
+            self.code.add_cells(
+                ctypes.byref(self.element),
+                ctypes.c_long(some.stop - some.start),
+                _address(self.corners[some]),
+                _address(values),
+                ctypes.c_int(values.shape[-1]),
+                _address(self.unknowns[some]),
+                None if into is None else _address(into.places[some]),
+                _address(residual),
+                None if into is None else _address(into.entries),
+                ctypes.c_double(1.0 if into is None else into.unit),
+                None if moves is None else _address(moves),
+            )
+        if self.projection is not None:
+            names = self.unknowns[:, 3 * self.nodes :]
+            np.subtract.at(residual, names, np.einsum("mcd,md->mc", self.projection, self.function.x.array[names]))
+            if into is not None:
+                own = into.places[:, 3 * self.nodes :, 3 * self.nodes :]
+                np.subtract.at(into.entries, own, into.unit**2 * self.projection)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
         """Add the tangent of tractions at points of ``cells`` (n,) with the values ``basis`` (n, k) of their functions; ``slope``
@@ -139,16 +152,6 @@ class CellSums:
             return 0.0
         values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]
         return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
-
-    def _stabilise(self, residual: Floats, into: Tangent | None = None) -> None:
-        """Add the stabilisation of the pressure, where the element needs it."""
-        if self.projection is None:
-            return
-        names = self.unknowns[:, 3 * self.nodes :]
-        np.subtract.at(residual, names, np.einsum("mcd,md->mc", self.projection, self.function.x.array[names]))
-        if into is not None:
-            own = into.places[:, 3 * self.nodes :, 3 * self.nodes :]
-            np.subtract.at(into.entries, own, into.unit**2 * self.projection)
 
     def _projection(self) -> Floats:
         """The second derivative (m, p, p) by cell [mm3/MPa] of the negative energy of ``body.is_stabilised``, at rest."""
@@ -186,32 +189,6 @@ class CellSums:
     def _chunks(self) -> list[slice]:
         return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]
 
-    def _add(
-        self,
-        given: Any,
-        some: slice,
-        residual: Floats,
-        into: Tangent | None = None,
-        moves: Floats | None = None,
-        *,
-        pointwise: bool = False,
-    ) -> None:
-        values = given.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
-        values = _without_pressure(values, 3 * self.form.kinds) if pointwise else values
-        self.code.add_cells(
-            ctypes.byref(self.element),
-            ctypes.c_long(some.stop - some.start),
-            _address(self.corners[some]),
-            _address(values),
-            ctypes.c_int(values.shape[-1]),
-            _address(self.unknowns[some]),
-            None if into is None else _address(into.places[some]),
-            _address(residual),
-            None if into is None else _address(into.entries),
-            ctypes.c_double(1.0 if into is None else into.unit),
-            None if moves is None else _address(moves),
-        )
-
 
 def _without_pressure(values: Floats, others: int) -> Floats:
     """First derivatives by ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The stiffness from
@@ -242,18 +219,14 @@ def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Fl
     """The tables that ``cells.c`` needs of an element at the points of a ``rule``."""
     kind, degree, pressure = ELEMENTS[element]
     points, weights = rule
-    cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped
-    displaced = basix.create_element(basix.ElementFamily.P, cell, degree, warped).tabulate(1, points)[..., 0]
-    shape = basix.create_element(basix.ElementFamily.P, cell, msh.geometry.cmap.degree, warped)
-    if pressure is None:
-        pressures = np.zeros((len(points), 1))
-    elif pressure == 0:
-        pressures = np.ones((len(points), 1))
-    else:
-        pressures = basix.create_element(basix.ElementFamily.P, cell, pressure, warped).tabulate(0, points)[0, :, :, 0]
+    displaced = lagrange(kind, degree).tabulate(1, points)[..., 0]
+    shape = lagrange(kind, msh.geometry.cmap.degree).tabulate(1, points)[1:, :, :, 0]
+    pressures = np.full((len(points), 1), float(pressure == 0))  # constant in the cell, or none
+    if pressure:
+        pressures = lagrange(kind, pressure).tabulate(0, points)[0, :, :, 0]
     return {
         "weights": np.asarray(weights),
-        "shape": np.moveaxis(shape.tabulate(1, points)[1:, :, :, 0], 0, -1),
+        "shape": np.moveaxis(shape, 0, -1),
         "slopes": np.moveaxis(displaced[1:], 0, -1),
         "values": displaced[0],
         "pressures": pressures,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,19 +12,6 @@ from fem_reference.solvers.fenicsx.forms import TimeStep
 
 # Share of all frames for which forces act on a body at rest, to find its initial acceleration.
 _INSTANT = 1e-7
-
-
-class Momentum(Protocol):
-    """Time integration of an effect with momentum."""
-
-    def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement predicted from velocities alone."""
-
-    def advanced(self, u: Any, v: Any, a: Any, now: Any, seconds: float) -> tuple[Any, Any]:
-        """Velocity and acceleration after a step."""
-
-    def begun(self, u: Any, seconds: float) -> Any:
-        """The acceleration after an instant, from rest."""
 
 
 class Clock:
@@ -37,7 +24,8 @@ class Clock:
     def __init__(self, body: Body, step: TimeStep | None) -> None:
         self.step, self.interval, self.at, self.first = step, body.interval, body.frames[0], body.first
         self.whole = body.frames[-1] - body.frames[0]
-        self.momentum: Momentum | None = next((one for one in body.effects if "momentum" in one.needs), None)  # type: ignore[assignment]
+        # An effect with momentum, such as inertia, has the formulas of its time integration.
+        self.momentum: Any = next((one for one in body.effects if "momentum" in one.needs), None)
         size = 0 if step is None or self.momentum is None else len(step.before.x.array)
         self.velocity, self.acceleration = np.zeros(size), np.zeros(size)
         self.resting = self.momentum is not None
@@ -54,12 +42,11 @@ class Clock:
 
     def settle(self, frame: float, unknowns: Floats) -> None:
         """Settle the load step to ``frame``, which ends with ``unknowns``, as the last good one."""
-        if self.step is not None and self.momentum is not None and frame > self.first:
+        self.at = frame
+        if self.step is not None and self.step.velocity is not None and frame > self.first:
             moved = (self.step.before.x.array, self.velocity, self.acceleration, unknowns)
             self.velocity, self.acceleration = self.momentum.advanced(*moved, 1 / float(self.step.rate.value))
-            assert self.step.velocity is not None  # with momentum
             self.step.velocity.x.array[:] = self.velocity
-        self.at = frame
 
     def begins(self) -> bool:
         """True where a body with inertia first moves in the next load step; its acceleration has to be known."""
@@ -72,7 +59,6 @@ class Clock:
     def begin(self, unknowns: Floats) -> None:
         """End the instant with ``unknowns``: velocities are 0, and accelerations known."""
         assert self.step is not None  # there is momentum
-        assert self.momentum is not None
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False
 
@@ -82,17 +68,15 @@ class Clock:
         if self.step is None:
             yield
             return
-        given = (self.step.before, self.step.predicted)
-        now, passed = float(self.step.rate.value), [None if one is None else np.array(one.x.array) for one in given]
-        for one in given:
-            if one is not None:
-                one.x.array[:] = unknowns
+        starts = [one.x.array for one in (self.step.before, self.step.predicted) if one is not None]
+        rate, before = float(self.step.rate.value), [np.array(start) for start in starts]
+        for start in starts:
+            start[:] = unknowns
         self.step.rate.value = 1 / self._seconds(self.whole)
         yield
-        self.step.rate.value = now
-        for one, values in zip(given, passed, strict=True):
-            if one is not None:
-                one.x.array[:] = values
+        self.step.rate.value = rate
+        for start, values in zip(starts, before, strict=True):
+            start[:] = values
 
     def arrays(self) -> dict[str, Floats]:
         """The arrays that restore the last load step, besides the unknowns at its end."""
@@ -112,17 +96,16 @@ class Clock:
         if self.step is None:
             return
         self.step.before.x.array[:], self.step.rate.value = arrays["before"], facts["rate"]
-        if self.momentum is not None and self.step.velocity is not None:
+        if self.step.velocity is not None:
             self.velocity, self.acceleration = arrays["velocity"], arrays["acceleration"]
             self.step.velocity.x.array[:] = self.velocity
 
     def _set(self, unknowns: Floats, seconds: float) -> None:
         assert self.step is not None  # called only with momentum
         self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds
-        if self.momentum is not None and self.step.predicted is not None:
-            self.step.predicted.x.array[:] = self.momentum.predicted(
-                unknowns, self.velocity, self.acceleration, seconds
-            )
+        if self.step.predicted is not None:
+            moving = unknowns, self.velocity, self.acceleration
+            self.step.predicted.x.array[:] = self.momentum.predicted(*moving, seconds)
 
     def _seconds(self, frames: float) -> float:
         assert self.interval is not None  # checked where an effect needs it

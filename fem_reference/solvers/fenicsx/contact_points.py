@@ -6,14 +6,13 @@ from typing import Any
 
 import basix
 import numpy as np
-from dolfinx import fem
 from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.embedding import barycentric
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Cells
-from fem_reference.solvers.fenicsx.tabulated import geometry
+from fem_reference.solvers.fenicsx.reference_cells import Displacement, geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,61 +63,44 @@ class Carried:
     shares: csr_array
 
 
-def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points, by a rule of ``degree``, on those of the ``facets`` that belong to this rank's own cells. ``space``
-    is that of the displacement, ``parents`` (n,) the unknown of each of its degrees of freedom.
-    """
-    kind = basix.CellType[mesh.kind]
-    sides = _sides(space.mesh.topology, facets)
+def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
+    """The quadrature points, by a rule of ``degree``, on those of the ``facets`` that belong to this rank's own cells."""
+    kind, msh = basix.CellType[mesh.kind], displacement.space.mesh
+    sides = _sides(msh.topology, facets)
     side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral
     points, weights = basix.make_quadrature(side, degree)
     corners, topology = basix.geometry(kind), basix.topology(kind)[2]
-    parts = [_empty(space)]
+    parts = []
     for number, vertices in enumerate(topology):
         cells = sides[sides[:, 1] == number, 0]
         first, *others = corners[vertices[:3]]
         edges = np.stack([other - first for other in others])  # along the two coordinates of the facet
         within = first + points @ edges
-        places, slopes = geometry(space.mesh, within, cells)
+        places, slopes = geometry(msh, within, cells)
         across = np.cross(slopes @ edges[0], slopes @ edges[1])
         areas = np.linalg.norm(across, axis=2) * weights
         repeated = np.repeat(cells, len(points))
-        parts.append(_points(space, parents, repeated, np.tile(within, (len(cells), 1)), places, areas))
+        parts.append(_points(displacement, repeated, np.tile(within, (len(cells), 1)), places, areas))
     columns = ([getattr(part, entry.name) for part in parts] for entry in fields(ContactPoints))
     return ContactPoints(*(np.concatenate(column) for column in columns))
 
 
-def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> ContactPoints:
-    """The points of a ``skin`` in this rank's own cells; ``local`` maps cells of the body's mesh to cells of this rank."""
-    mine = np.array([i for i, cell in enumerate(skin.cells) if int(cell) in local], np.int64)
-    cells = np.array([local[int(skin.cells[i])] for i in mine], np.int64)
-    msh = space.mesh
-    corners = msh.geometry.x[msh.geometry.dofmap[cells]]
-    points = skin.points[mine]
-    within = barycentric(points, corners)[:, 1:]
-    return _points(space, parents, cells, within, points, skin.areas[mine])
+def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoints:
+    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): by cell of the body's mesh that of this rank, else -1."""
+    mine, msh = np.flatnonzero(local[skin.cells] >= 0), displacement.space.mesh
+    cells, points = local[skin.cells[mine]], skin.points[mine]
+    within = barycentric(points, msh.geometry.x[msh.geometry.dofmap[cells]])[:, 1:]
+    return _points(displacement, cells, within, points, skin.areas[mine])
 
 
-def _points(
-    space: fem.FunctionSpace, parents: Ints, cells: Ints, within: Floats, rest: Floats, areas: Floats
-) -> ContactPoints:
+def _points(displacement: Displacement, cells: Ints, within: Floats, rest: Floats, areas: Floats) -> ContactPoints:
     """Points at reference coordinates ``within`` (n, 3) of ``cells`` (n,)."""
-    basis = _element(space).tabulate(0, within)[0, :, :, 0]
-    nodes = space.dofmap.list[cells].astype(np.int64)
-    dofs = np.asarray(parents, np.int64)[3 * nodes[:, :, None] + np.arange(3)]
+    space = displacement.space
+    element: Any = space.element.basix_element
+    basis = element.tabulate(0, within)[0, :, :, 0]
+    nodes = space.dofmap.list[cells]
     places = space.tabulate_dof_coordinates()[nodes]
-    return ContactPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, places, dofs)
-
-
-def _empty(space: fem.FunctionSpace) -> ContactPoints:
-    count = space.dofmap.list.shape[1]
-    no = np.zeros(0, np.int64)
-    none = np.zeros((0, count, 3))
-    return ContactPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), none, none.astype(np.int64))
-
-
-def _element(space: fem.FunctionSpace) -> Any:
-    return space.element.basix_element
+    return ContactPoints(rest.reshape(-1, 3), areas.ravel(), cells, basis, places, displacement.dofs[nodes])
 
 
 def _sides(topology: Any, facets: Ints) -> Ints:

@@ -11,12 +11,14 @@ from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.problems.body import Kind, reference_nodes
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
-from fem_reference.solvers.fenicsx.tabulated import Displacement, geometry
+from fem_reference.solvers.fenicsx.reference_cells import Displacement, geometry
 
 
 @dataclass(frozen=True)
-class Smallest:
-    """The smallest det F over a set of points of the cells, with the kind of point, the cell and the rest position [mm]."""
+class Extreme:
+    """The least or greatest ``value`` over cells, with the ``cell`` of the body and the rest position [mm]. ``where``: the kind of
+    point, empty for means over cells.
+    """
 
     value: float
     where: str
@@ -24,7 +26,19 @@ class Smallest:
     at: tuple[float, float, float]
 
     def __str__(self) -> str:
-        return f"{self.value:.3f} at a {self.where} of cell {self.cell} at {place_of(self.at)}"
+        value = f"{self.value:.3f} at a {self.where} of" if self.where else f"{self.value:.3g} in"
+        return f"{value} cell {self.cell} at {place_of(self.at)}"
+
+
+def least(comm: MPI.Comm, values: Floats, cells: Ints, at: Floats, where: str = "", sign: float = 1.0) -> Extreme:
+    """The least of ``sign values`` (n, ...) of all ranks' ``cells`` (n,) ``at`` places (n, ..., 3); NaN counts as least."""
+    mine = Extreme(sign * np.inf, where, -1, (0.0, 0.0, 0.0))
+    if len(cells):  # not so on a rank without cells
+        i = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, sign * values)), values.shape)
+        x, y, z = at[i].tolist()
+        mine = Extreme(float(values[i]), where, int(cells[i[0]]), (x, y, z))
+    everywhere: list[Extreme] = comm.allgather(mine)
+    return min(everywhere, key=lambda one: (not np.isnan(one.value), sign * one.value))
 
 
 class Determinants:
@@ -33,32 +47,31 @@ class Determinants:
     def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
         """``cells``: the cell of the body for each of this rank's; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
-        self.points = {"quadrature point": rule, "vertex": reference_nodes(kind, 1)}
+        vertices = reference_nodes(kind, 1)
         # Compiled, as each iteration needs it, and by all ranks together: a rank without cells evaluates it nowhere.
         self.inside = compiling.expression(determinant, rule)
-        self.at_vertices = displacement.tabulated(self.points["vertex"], len(cells))
-        self.rest, slopes = {}, {}
-        for name, points in self.points.items():
-            self.rest[name], slopes[name] = geometry(self.mesh, points, slice(len(cells)))
-        self.to_reference = np.linalg.inv(slopes["vertex"])
+        self.at_vertices = displacement.tabulated(vertices, len(cells))
+        at_vertices, slopes = geometry(self.mesh, vertices, slice(len(cells)))
+        self.rest = {"quadrature point": geometry(self.mesh, rule, slice(len(cells)))[0], "vertex": at_vertices}
+        self.to_reference = np.linalg.inv(slopes)
 
-    def smallest(self, where: str | None = None) -> Smallest:
+    def smallest(self, where: str | None = None) -> Extreme:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
-        return self._least([self._mine(name, self._at(name)) for name in ([where] if where else self.points)])
+        found = [self._smallest(name, self._at(name)) for name in ([where] if where else self.rest)]
+        return min(found, key=lambda one: (not np.isnan(one.value), one.value))
 
     def trouble(self, _: Floats, /) -> Trouble | None:
         """Inverted where det F is not positive somewhere."""
         smallest = self.smallest()
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
-    def smallest_of(self, values: Floats) -> Smallest:
+    def smallest_of(self, values: Floats) -> Extreme:
         """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and its place; NaN is smallest."""
-        where = "quadrature point"
-        return self._least([self._mine(where, values.reshape(len(self.cells), len(self.points[where])))])
+        return self._smallest("quadrature point", values)
 
-    def _least(self, mine: list[Smallest]) -> Smallest:
-        everywhere: list[Smallest] = [found for rank in self.mesh.comm.allgather(mine) for found in rank]
-        return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
+    def _smallest(self, where: str, values: Floats) -> Extreme:
+        places = self.rest[where]
+        return least(self.mesh.comm, values.reshape(places.shape[:2]), self.cells, places, where)
 
     def values_now(self) -> Floats:
         """Det F at the quadrature points of this rank's cells (p,), where the energies are evaluated."""
@@ -71,16 +84,9 @@ class Determinants:
     def _at(self, where: str) -> Floats:
         """Det F by cell of this rank and point of a kind."""
         if len(self.cells) == 0:
-            return np.zeros((0, len(self.points[where])))
+            return np.zeros(self.rest[where].shape[:2])
         if where == "vertex":
             slopes = self.at_vertices.slopes_at(self.unknowns.array)
             return np.asarray(np.linalg.det(np.eye(3) + slopes @ self.to_reference))
         values = self.inside.eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
         return np.asarray(values).reshape(len(self.cells), -1)
-
-    def _mine(self, where: str, values: Floats) -> Smallest:
-        if len(self.cells) == 0:  # a rank without cells
-            return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
-        cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
-        x, y, z = self.rest[where][cell, point]
-        return Smallest(float(values[cell, point]), where, int(self.cells[cell]), (float(x), float(y), float(z)))

@@ -29,9 +29,8 @@ with _without("numba") as nowhere:
     import dolfinx
     from petsc4py import PETSc
 
-    if (
-        nowhere
-    ):  # where numba is loaded, this would make libraries of the wheel global, and h5py take its HDF5 for its own
+    # Where numba is loaded, this would make libraries of the wheel global, and h5py take its HDF5 for its own.
+    if nowhere:
         import dolfinx.fem.petsc
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])

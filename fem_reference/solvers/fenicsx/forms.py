@@ -12,28 +12,21 @@ from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
 from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
+from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
-from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
+from fem_reference.solvers.fenicsx import compiling, meshes
+from fem_reference.solvers.fenicsx.reference_cells import DEGREE, geometry, rule
 from fem_reference.solvers.fenicsx.settings import BodySettings
-from fem_reference.solvers.fenicsx.tabulated import geometry
 
 Rule = tuple[Floats, Floats]
 
 
-class UflFunctions:
-    """``effects.Functions`` of UFL expressions."""
+def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+    return ufl.conditional(ufl.gt(x, limit), then, otherwise)
 
-    exp = staticmethod(ufl.exp)
-    log = staticmethod(ufl.ln)
-    sqrt = staticmethod(ufl.sqrt)
-    cos = staticmethod(ufl.cos)
-    sin = staticmethod(ufl.sin)
 
-    @staticmethod
-    def above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-        """``then`` where ``x > limit``, else ``otherwise``."""
-        return ufl.conditional(ufl.gt(x, limit), then, otherwise)
+_FUNCTIONS = Functions(ufl.exp, ufl.ln, ufl.sqrt, ufl.cos, ufl.sin, _above)
 
 
 class Derivatives(NamedTuple):
@@ -57,10 +50,14 @@ class Form:
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
         """``cells``: the cell of the body for each of this rank's."""
-        self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
-        self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
-        self.degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
-        self.dx, self.ds = _measures(msh, self.regions, self.rule, self.degree)
+        self.mesh = msh
+        self.regions = dict(zip(body.mesh.facets, meshes.local_facets(msh, body.mesh.facets.values()), strict=True))
+        self.rule = rule(settings.element, settings.quadrature_degree)
+        self.degree = settings.quadrature_degree or DEGREE[settings.element]
+        points, weights = self.rule
+        inside = {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
+        self.dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": self.degree} | inside)
+        self.ds = meshes.facet_measure(msh, self.regions.values(), self.degree)
         self.effects, self.amounts = body.effects, [fem.Constant(msh, 1.0) for _ in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
@@ -71,12 +68,13 @@ class Form:
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.energy = total_energy(stored, state) * self.dx
         self.kinetic = self._kinetic(effects)
-        placed = not _vanishes(ufl.diff(total_energy(acting, state), variables.displacement))
-        self.kinds = 3 + placed
+        by_place = expand_derivatives(ufl.diff(total_energy(acting, state), variables.displacement))
+        self.kinds = 3 if isinstance(by_place, Zero) else 4
         self.silent = [_silent(effect, body.frames) for effect in body.effects]
+        instants = [*body.frames, *((a + b) / 2 for a, b in pairwise(body.frames))]
         self._made = {
             quiet: self._derivatives([one for one, off in zip(acting, quiet, strict=True) if not off], state, variables)
-            for quiet in dict.fromkeys(map(self._quiet, _instants(body.frames)))
+            for quiet in dict.fromkeys(map(self._quiet, instants))
         }
         self.set_amounts(body.frames[0])
         self.loads = self._loads(acting, state, unknowns)
@@ -128,20 +126,6 @@ class Form:
         return [function[i] for i in range(3)]
 
 
-def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int) -> tuple[Any, Any]:
-    """The measures of the cells, by a rule, and of the facets, by number of region and by degree."""
-    points, weights = rule
-    inside = {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
-    kind = fem.IntegralType.exterior_facet
-    parts = [
-        (i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions.values())
-    ]
-    return (
-        ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": degree} | inside),
-        ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree}),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class TimeStep:
     """A load step with a duration: its inverse ``rate`` [1/s], the unknowns ``before`` it, and with inertia the ``predicted``
@@ -185,7 +169,7 @@ def _state(unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | Non
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
-        functions=UflFunctions(),
+        functions=_FUNCTIONS,
         **timed,
     )
     return state, _Variables(F, displacement, others[0] if others else None)
@@ -212,11 +196,6 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
     ]
 
 
-def _instants(frames: tuple[float, ...]) -> list[float]:
-    """The ``frames``, and the middle between each two."""
-    return [*frames, *((a + b) / 2 for a, b in pairwise(frames))]
-
-
 def _differentiated(energy: Any, by: _Variables, kinds: int) -> tuple[list[Any], list[Any]]:
     """The first derivatives of ``energy`` by all variables (``kinds`` per component of the displacement, then the pressure), and
     the upper triangle of the second ones, in the order of ``cells.c``.
@@ -225,26 +204,22 @@ def _differentiated(energy: Any, by: _Variables, kinds: int) -> tuple[list[Any],
         (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(kinds)
     ]
     variables += [(by.pressure, ())] if by.pressure is not None else []
-    first = [_part(ufl.diff(energy, symbol), where) for symbol, where in variables]
-    second = [_part(ufl.diff(slope, symbol), where) for i, slope in enumerate(first) for symbol, where in variables[i:]]
+
+    def slope(value: Any, variable: Any, where: tuple[int, ...]) -> Any:
+        return ufl.diff(value, variable)[where] if where else ufl.diff(value, variable)
+
+    first = [slope(energy, *variable) for variable in variables]
+    second = [slope(one, *variable) for i, one in enumerate(first) for variable in variables[i:]]
     return first, second
-
-
-def _part(derivative: Any, where: tuple[int, ...]) -> Any:
-    return derivative[where] if where else derivative
-
-
-def _vanishes(derivative: Any) -> bool:
-    return isinstance(expand_derivatives(derivative), Zero)
 
 
 def _symbolic(effect: Effect, msh: mesh.Mesh) -> Effect:
     """The effect with each numerical parameter replaced by a constant of the mesh."""
-    values = {name: getattr(effect, name) for name in type(effect).model_fields}
-    symbols: dict[str, Any] = {
-        name: fem.Constant(msh, value) for name, value in values.items() if isinstance(value, float)
-    }
-    for name, value in values.items():
-        if isinstance(value, tuple) and all(isinstance(entry, float) for entry in value):
+    symbols: dict[str, Any] = {}
+    for name in type(effect).model_fields:
+        value = getattr(effect, name)
+        if isinstance(value, float):
+            symbols[name] = fem.Constant(msh, value)
+        elif isinstance(value, tuple) and all(isinstance(entry, float) for entry in value):
             symbols[name] = tuple(fem.Constant(msh, entry) for entry in value)
     return effect.model_copy(update=symbols)

@@ -1,21 +1,23 @@
-"""A body's mesh in DOLFINx: distributed over ranks, with its regions, its unknowns and the positions of its nodes."""
+"""A body's mesh in DOLFINx: distributed over ranks, with its regions and its unknowns."""
 
-import basix
+from collections.abc import Iterable
+
 import basix.ufl
 import numpy as np
+import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Ints
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
-from fem_reference.solvers.fenicsx.tabulated import Displacement
+from fem_reference.solvers.fenicsx.reference_cells import lagrange
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
     """The mesh, distributed over the ranks; the first rank provides it."""
     element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
-    nodes = basix.create_element(basix.ElementFamily.P, basix.CellType[cells.kind], cells.degree, _VARIANT).points
     ours = reference_nodes(cells.kind, cells.degree)
+    nodes = lagrange(cells.kind, cells.degree).points
     order = [int(np.argmin(np.linalg.norm(ours - node, axis=1))) for node in nodes]
     brings = slice(None) if comm.rank == 0 else slice(0)
     return mesh.create_mesh(
@@ -28,54 +30,26 @@ def own_cells(msh: mesh.Mesh) -> Ints:
     return np.asarray(msh.topology.original_cell_index, np.int64)[: msh.topology.index_map(3).size_local]
 
 
-_VARIANT = basix.LagrangeVariant.gll_warped
+def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
+    """This rank's facets of each region, whose facets (f, k) are given by their corners, points of the original mesh."""
+    topology, facet = msh.topology, msh.topology.dim - 1
+    for start, end in ((facet, facet + 1), (facet + 1, facet), (facet, 0), (0, facet + 1), (facet + 1, 0)):
+        topology.create_connectivity(start, end)
+    exterior, vertices = mesh.exterior_facet_indices(topology), topology.connectivity(facet, 0)
+    count = topology.index_map(0).size_local + topology.index_map(0).num_ghosts
+    nodes = mesh.entities_to_geometry(msh, 0, np.arange(count, dtype=np.int32))[:, 0]
+    points = np.asarray(msh.geometry.input_global_indices)[nodes]
+    corners = vertices.array.reshape(vertices.num_nodes, -1)[exterior]
+    original = list(map(tuple, np.sort(points[corners], axis=1).tolist()))
+    wanted = (set(map(tuple, np.sort(region, axis=1).tolist())) for region in regions)
+    return [exterior[np.array([corners in region for corners in original], bool)] for region in wanted]
 
 
-def local_facets(msh: mesh.Mesh, facets: dict[str, Ints]) -> dict[str, Ints]:
-    """This rank's facets of each region; the corners (f, 3 or 4) are points of the body's mesh."""
-    for start, end in ((2, 3), (2, 0), (0, 3), (3, 0), (3, 2)):
-        msh.topology.create_connectivity(start, end)
-    exterior = mesh.exterior_facet_indices(msh.topology)
-    original = np.sort(_original_points(msh)[_corners(msh, exterior)], axis=1).tolist()
-    found = {}
-    for name, wanted in facets.items():
-        corners = {tuple(facet) for facet in np.sort(wanted, axis=1).tolist()}
-        found[name] = exterior[np.array([tuple(facet) in corners for facet in original], bool)]
-    return found
-
-
-def _corners(msh: mesh.Mesh, facets: Ints) -> Ints:
-    """The vertices (f, 3 or 4) of facets."""
-    connected = msh.topology.connectivity(2, 0)
-    count = 3 if msh.topology.cell_name() == "tetrahedron" else 4
-    return np.array([connected.links(facet) for facet in facets], np.int64).reshape(len(facets), count)
-
-
-def _original_points(msh: mesh.Mesh) -> Ints:
-    """The point of the body's mesh for each vertex of this rank."""
-    connected = msh.topology.connectivity(3, 0)
-    corners = connected.array.reshape(connected.num_nodes, 4 if msh.topology.cell_name() == "tetrahedron" else 8)
-    points = np.full(msh.topology.index_map(0).size_local + msh.topology.index_map(0).num_ghosts, -1, np.int64)
-    points[corners] = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap[:, : corners.shape[1]]]
-    return points
-
-
-class Nodes:
-    """The nodes of the body's mesh, moved by a displacement."""
-
-    def __init__(self, cells: Cells, own: Ints, displacement: Displacement) -> None:
-        """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""
-        self.cells, self.own, self.unknowns = cells, own, displacement.unknowns.x
-        self.comm = displacement.space.mesh.comm
-        self.moves = displacement.tabulated(reference_nodes(cells.kind, cells.degree), len(own))
-
-    def positions(self) -> Floats:
-        """The present positions (n, 3) [mm] of the nodes, on every rank."""
-        points = np.array(self.cells.points)
-        for own, moved in self.comm.allgather((self.own, self.moves.at(self.unknowns.array))):
-            if len(own):
-                points[self.cells.cells[own]] = self.cells.points[self.cells.cells[own]] + moved
-        return points
+def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
+    """The measure of this rank's facets, by number of the region and by degree."""
+    kind = fem.IntegralType.exterior_facet
+    parts = [(i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions)]
+    return ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree})
 
 
 def unknowns(msh: mesh.Mesh, element: str) -> fem.Function:

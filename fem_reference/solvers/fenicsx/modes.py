@@ -64,7 +64,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
     before, body.system.contact = np.array(body.unknowns.x.array), body.contact
-    direction, size = _lowest(body, body.stability.pressures), share * diagonal(body.nodes.cells.points)
+    direction, size = _lowest(body, body.stability.pressures), share * diagonal(body.nodal.cells.points)
     for amount in (sign * larger * size for larger in _LARGER for sign in (1, -1)):
         body.unknowns.x.array[:] = before + amount * direction
         body.unknowns.x.scatter_forward()
@@ -72,9 +72,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
             body.contact.update(frame)
         found = body.newton.solve(frame)
         if found.converged and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
-            body.path.settle(body.energy(), connected=False)
-            if body.contact:
-                body.contact.settle()
+            body.arrive(frame)
             return float(abs(amount))
         body.go_back(before)
     body.system.linearise()

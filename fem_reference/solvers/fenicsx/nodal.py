@@ -1,31 +1,38 @@
-"""The unknowns of a body's cells, in an order that readers without FEniCSx understand."""
+"""Positions and unknowns of a body's nodes and cells on every rank, in an order that readers without FEniCSx understand."""
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import ELEMENTS, reference_nodes
+from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.solvers.fenicsx.tabulated import Displacement, tabulate
+from fem_reference.solvers.fenicsx.reference_cells import Displacement, tabulate
 
 
 class Nodal:
-    """Gathers the unknowns of every cell of the body's mesh from the ranks that own them."""
+    """Gathers what belongs to the ``cells`` of a body from the ranks that own them."""
 
-    def __init__(self, own: Ints, element: str, displacement: Displacement, clock: Clock) -> None:
-        """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""
+    def __init__(self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock) -> None:
+        """``own``: the cells that are this rank's, in the rank's order."""
         kind, degree, order = ELEMENTS[element]
-        nodes, corners = reference_nodes(kind, degree), reference_nodes(kind, 1)
-        self.own, self.clock, self.unknowns = own, clock, displacement.unknowns.x
+        self.cells, self.own, self.clock, self.unknowns = cells, own, clock, displacement.unknowns.x
         self.comm = displacement.space.mesh.comm
-        self.displacement, self.pressure = displacement.tabulated(nodes, len(own)), None
+        self.moves = displacement.tabulated(reference_nodes(cells.kind, cells.degree), len(own))
+        self.displacement = displacement.tabulated(reference_nodes(kind, degree), len(own))
+        self.pressure = None
         if order is not None:
-            space = displacement.unknowns.function_space.sub(1)
+            space, corners = displacement.unknowns.function_space.sub(1), reference_nodes(kind, 1)
             points = corners if order else corners.mean(axis=0)[None]
             self.pressure = tabulate(space, space.dofmap.list[: len(own), :, None], points)
 
+    def positions(self) -> Floats:
+        """The present positions (n, 3) [mm] of the nodes of the mesh."""
+        points = np.array(self.cells.points)
+        points[self.cells.cells] += self._gathered(self.moves.at(self.unknowns.array))
+        return points
+
     def state(self) -> NodalState:
-        """The present state, the same on every rank."""
+        """The present state of all cells."""
         displacement = self._gathered(self.displacement.at(self.unknowns.array))
         pressure, before, rate = np.zeros((len(displacement), 0)), np.zeros((0, 0, 3)), 0.0
         if self.pressure is not None:
@@ -36,8 +43,7 @@ class Nodal:
         return NodalState(displacement, pressure, before, rate)
 
     def _gathered(self, mine: Floats) -> Floats:
-        parts = self.comm.allgather((self.own, mine))
-        gathered = np.zeros((sum(len(own) for own, _ in parts), *mine.shape[1:]))
-        for own, part in parts:
+        gathered = np.zeros((len(self.cells.cells), *mine.shape[1:]))
+        for own, part in self.comm.allgather((self.own, mine)):
             gathered[own] = part
         return gathered

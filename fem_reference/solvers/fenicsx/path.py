@@ -9,7 +9,7 @@ from mpi4py import MPI
 from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.solvers.common.state_checks import Trouble
-from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
+from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Path:
         self.energy, self.greatest, self.gap = 0.0, 0.0, 0.0
         self.unknowns, self.forces = np.array(system.unknowns.x.array), self.system.reactions(inside=True)
 
-    def jumped(self, before: Floats) -> Smallest | None:
+    def jumped(self, before: Floats) -> Extreme | None:
         """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones;
         None unless it is next to nothing. A body that deforms steadily in small steps never gets there.
         """

@@ -85,38 +85,30 @@ def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
 def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "multigrid"]]:
     """The linear solvers for an ``element`` and this number of unknowns, the preferred one first."""
     _, degree, pressure = ELEMENTS[element]
-    if count < SMALL:
-        return ["direct"]
-    if degree == 1 or pressure is None:
-        return ["lagged"]
+    if count < SMALL or degree == 1 or pressure is None:
+        return ["direct" if count < SMALL else "lagged"]
     return ["lagged", "multigrid"] if count < LARGE else ["multigrid"]
 
 
 def idle_cores() -> int:
     """The number of idle cores among those of this process; all of them where the system does not report it."""
     mine = os.sched_getaffinity(0)
-    before = _idle(mine)
-    if before is None:
-        return len(mine)
-    begin = time.perf_counter()
-    time.sleep(_GLANCE)
-    after = _idle(mine)
-    ticks = (time.perf_counter() - begin) * os.sysconf("SC_CLK_TCK")
-    return len(mine) if after is None else round((after - before) / ticks)
-
-
-def _idle(cores: set[int]) -> float | None:
-    """The clock ticks for which ``cores`` have been idle since the system started."""
     try:
-        lines = Path("/proc/stat").read_text(encoding="utf-8").splitlines()
-        fields = {line.split()[0]: line.split() for line in lines}
-        return sum(float(fields[f"cpu{core}"][4]) for core in cores)
+        before, begin = _idle(mine), time.perf_counter()
+        time.sleep(_GLANCE)
+        ticks = (time.perf_counter() - begin) * os.sysconf("SC_CLK_TCK")
+        return round((_idle(mine) - before) / ticks)
     except (OSError, KeyError, IndexError, ValueError):
-        return None
+        return len(mine)
+
+
+def _idle(cores: set[int]) -> float:
+    """The clock ticks for which ``cores`` have been idle since the system started."""
+    fields = {line.split()[0]: line.split() for line in Path("/proc/stat").read_text(encoding="utf-8").splitlines()}
+    return sum(float(fields[f"cpu{core}"][4]) for core in cores)
 
 
 def ranks(settings: BodySettings, count: int) -> int:
     """The number of ranks for a solution of ``count`` unknowns: two where that pays and a core is free for each."""
-    if settings.linear_solver == "multigrid" or count < _WORTH_RANKS:
-        return 1
-    return 2 if idle_cores() >= 2 else 1
+    worth = settings.linear_solver != "multigrid" and count >= _WORTH_RANKS
+    return 2 if worth and idle_cores() >= 2 else 1

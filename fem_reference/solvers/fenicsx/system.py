@@ -53,8 +53,8 @@ class System:
         self._make_matrix(structure)
         self.ties = [one for one in conditions if isinstance(one, PointSprings)]
         springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
-        self.springs, self.loads = (
-            SurfaceSums(terms, unknowns, structure, self.fixed) if terms else None for terms in (springs, form.loads)
+        self.loads, self.springs = (
+            [SurfaceSums(terms, unknowns, structure, self.fixed)] if terms else [] for terms in (form.loads, springs)
         )
         self.contact: ContactForces | None = None
 
@@ -76,7 +76,7 @@ class System:
         """Sum the residual into ``b`` and return its norm; contact ``tractions`` other than the present ones may be given."""
         with self.spent.on("assembly"):
             self.work.array[:] = 0
-            self.cells.add_residual(self.work.array)
+            self.cells.add(self.work.array)
             return self._finish(tractions, None)
 
     def linearise(
@@ -88,8 +88,8 @@ class System:
         with self.spent.on("assembly"):
             entries = self.tangent.entries
             self.work.array[:], entries[:] = 0, 0
-            self.cells.add_tangent(self.tangent, self.work.array, moves, pointwise=pointwise)
-            for terms in self._on_surface:
+            self.cells.add(self.work.array, self.tangent, moves, pointwise=pointwise)
+            for terms in self.springs + self.loads:
                 terms.add_tangent(entries)
             ties = [tie.tangent() for tie in self.ties]
             for points in [*ties, *(self.contact.tangent() if self.contact else ())]:
@@ -98,13 +98,9 @@ class System:
             self.matrix.setValuesCOO(entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
             return self._finish(tractions, moves)
 
-    @property
-    def _on_surface(self) -> list["SurfaceSums"]:
-        return [terms for terms in (self.springs, self.loads) if terms is not None]
-
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
         """Add all terms besides cells, and the parts of other ranks; the norm of the residual."""
-        for terms in self._on_surface:
+        for terms in self.springs + self.loads:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
             tie.add_residual(self.work.array, moves)
@@ -140,7 +136,7 @@ class System:
         """The unknowns minus their prescribed values (n,); 0 where nothing is prescribed."""
         found = np.zeros(self.size)
         for one in self.conditions:
-            found[one.exact] = self.unknowns.x.array[one.exact] - one.targets
+            found[one.exact] = self.unknowns.x.array[one.exact] - one.prescribed[: len(one.exact)]
         return found
 
     def lacking(self) -> bool:
@@ -153,9 +149,9 @@ class System:
         ``inside`` alone.
         """
         self.work.array[:] = 0
-        self.cells.add_residual(self.work.array)
-        if self.loads and not inside:
-            self.loads.add_residual(self.work.array, None)
+        self.cells.add(self.work.array)
+        for load in [] if inside else self.loads:
+            load.add_residual(self.work.array, None)
         if self.contact and not inside:
             self.contact.add_residual(self.work.array, None)
         self.work.scatter_reverse(la.InsertMode.add)

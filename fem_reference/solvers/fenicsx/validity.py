@@ -14,13 +14,13 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
-from fem_reference.solvers.fenicsx.determinants import Determinants
+from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, least
 from fem_reference.solvers.fenicsx.forms import Form, Rule
-from fem_reference.solvers.fenicsx.tabulated import geometry
+from fem_reference.solvers.fenicsx.reference_cells import geometry
 
 # A cell with less of its rest volume has collapsed, whatever the laws state: about four fifths of muscle are water,
 # which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal
@@ -28,18 +28,6 @@ from fem_reference.solvers.fenicsx.tabulated import geometry
 # share of it at rest: those at a rim are fewer the smaller they are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
-
-
-@dataclass(frozen=True)
-class Extreme:
-    """The smallest or greatest mean over a cell, with the cell of the body and its rest position [mm]."""
-
-    value: float
-    cell: int
-    at: tuple[float, float, float]
-
-    def __str__(self) -> str:
-        return f"{self.value:.3g} in cell {self.cell} at {place_of(self.at)}"
 
 
 @dataclass(frozen=True)
@@ -94,11 +82,8 @@ class Validity:
         self.values: dict[str, Callable[[], Floats]] = {"V/V0": determinants.values_now}
         if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
             # Compiled here and by all ranks together: one without cells evaluates none of it.
-            stretch, mine = (
-                compiling.expression(form.fibre_stretch, form.rule[0]),
-                np.arange(len(self.cells), dtype=np.int32),
-            )
-            self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine))
+            stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
+            self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
 
     def volume_ratio(self) -> float:
@@ -114,7 +99,7 @@ class Validity:
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
         if lost <= SHARE * whole:
             return None
-        why = f"{100 * lost / whole:.0f} % of the body collapsed: V/V0 is {self._least(means)}, below {COLLAPSED:g}"
+        why = f"{100 * lost / whole:.0f} % of the body collapsed: V/V0 is {self._extreme(means)}, below {COLLAPSED:g}"
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
@@ -126,7 +111,7 @@ class Validity:
         outside = np.zeros(len(self.cells), bool)
         for measure in self.values:
             means = self._means(measure)
-            low, high = self._least(means), self._least(means, -1.0)
+            low, high = self._extreme(means), self._extreme(means, -1.0)
             scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
             for law, limit in self._limits(measure, frame):
                 outside |= (means < limit.low) | (means > limit.high)
@@ -150,15 +135,9 @@ class Validity:
             return np.zeros(0)
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
 
-    def _least(self, means: Floats, sign: float = 1.0) -> Extreme:
+    def _extreme(self, means: Floats, sign: float = 1.0) -> Extreme:
         """The least of ``sign means`` (n,) over all ranks."""
-        mine = Extreme(sign * np.inf, -1, (0.0, 0.0, 0.0))
-        if len(means):
-            i = int(np.argmin(sign * means))
-            x, y, z = self.centres[i].tolist()
-            mine = Extreme(float(means[i]), int(self.cells[i]), (x, y, z))
-        everywhere: list[Extreme] = self.mesh.comm.allgather(mine)
-        return min(everywhere, key=lambda one: sign * one.value)
+        return least(self.mesh.comm, means, self.cells, self.centres, sign=sign)
 
 
 def volumes_and_centres(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:

@@ -8,8 +8,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from fem_reference.foundations.subprocesses import end_with_starter
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import end_with_starter, forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
@@ -178,9 +177,9 @@ class Worker:
             frame,
             samples.get("surface"),
             samples.get("fibres"),
-            points=body.node_positions(),
+            points=body.nodal.positions(),
             scalars={name: float(value) for name, value in scalars.items()},
-            state=body.state(),
+            state=body.nodal.state() if self.settings.store_state else None,
             forces=forces,
             moments=moments,
             residuals=reached.last.residuals,

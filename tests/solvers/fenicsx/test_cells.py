@@ -54,7 +54,7 @@ def tangent(cells: CellSums, unit: float = 1.0) -> tuple[np.ndarray, np.ndarray]
     """The tangent (n, n), with pressures in a ``unit``, and what is out of balance (n,)."""
     structure, residual = cells.structure(), np.zeros(cells.size)
     into = Tangent(np.zeros(len(structure.columns) + 1), cells.places(structure, np.zeros(cells.size, bool)), unit)
-    cells.add_tangent(into, residual, None)
+    cells.add(residual, into)
     parts = (into.entries[:-1], structure.columns, structure.starts)
     return csr_array(parts, shape=(cells.size, cells.size)).toarray(), residual
 
@@ -73,7 +73,7 @@ def test_the_tangent_is_the_slope_of_the_residual_with_stabilised_pressures_in_a
         for end, sign in zip(ends, (1, -1), strict=True):
             own[:] = now
             own[i] += sign * step
-            cells.add_residual(end)
+            cells.add(end)
         slope[:, i] = (ends[0] - ends[1]) / (2 * step) * scale * scale[i]
     assert (
         np.abs(found - slope).max() < 1e-8 * np.abs(found).max()
