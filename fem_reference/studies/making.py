@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from fem_reference.assessment import error_bars
 from fem_reference.foundations.records import Record
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
 from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.of_case import CaseSetup
