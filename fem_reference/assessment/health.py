@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fem_reference.assessment.stress import History
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
+from fem_reference.geometry.distance import outer_windings
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.geometry.windings import outer_windings
 from fem_reference.problems.setup import Bone
 
 

@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, 
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
-from fem_reference.geometry.penetrations import ClosedSurface, Depths, depths
+from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
@@ -226,25 +226,22 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
     allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    contact, rest = problem.contact, ClosedSurface(run.surface)
+    contact, rest = problem.contact, run.surface
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
-    inside = cache(lambda: ClosedSurface(skin()))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
-        muscle = ClosedSurface(run.surface.moved_to(run.positions[i]))
+        muscle = run.surface.moved_to(run.positions[i])
         for bone in bones:
             check_of = partial(
                 _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
             )
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
-                check = min(check, check_of(ClosedSurface(skin().moved_to(now)), inside()), key=lambda one: one.share)
+                check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
             yield check
 
 
-def _deep(
-    bone: Bone, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
-) -> RunCheck:
+def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
     """Penetration of a bone and the muscle; minus that at rest, where this exceeds the give of contact. Never up to the middle of
     a bone.
     """
@@ -252,13 +249,13 @@ def _deep(
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
         deepest, place = found.deepest(_at_rest(rest, bone))
-        give += _behind(muscle.surface, place) / half if pressed else 0.0
+        give += _behind(muscle, place) / half if pressed else 0.0
     allowed = min(give, _GIVEN_WAY * half)
     return _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
 
 
 @lru_cache(maxsize=8)
-def _at_rest(muscle: ClosedSurface, bone: Bone) -> Depths:
+def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 

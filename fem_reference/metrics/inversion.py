@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, place_of, triangle_areas
-from fem_reference.geometry.windings import outer_windings
+from fem_reference.geometry.distance import outer_windings
 from fem_reference.metrics import Measure, MeasurementContext, Statistic
 from fem_reference.runs.store import Run
 

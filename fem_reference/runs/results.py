@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.jets import JetFunctions, variables
+from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
@@ -206,7 +206,7 @@ class _Places:
             before=list(before.T),
             F_before=[list(row) for row in np.moveaxis(F_before, 0, -1)],
             rate=state.rate,
-            functions=JetFunctions(),
+            functions=JET_FUNCTIONS,
         )
 
 
