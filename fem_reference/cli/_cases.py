@@ -9,7 +9,7 @@ from typing import Any
 from fem_reference import metrics, report, solvers
 from fem_reference.assessment import judge
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
@@ -90,9 +90,7 @@ def check_names(names: list[str]) -> None:
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
-    """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read, and have names of their own;
-    InputError also where error bars are wanted of a case that has none.
-    """
+    """The bench of a case whose expectations, solvers and names are good; InputError, also for error bars of what has none."""
     if options.error_bar:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
@@ -135,12 +133,10 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
 
 
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure and judge the ``chosen`` candidates, and write the page; where the case has candidates and none is wanted, that of
-    the reference alone. What is bad in the input shows before anything is solved.
-    """
+    """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
     with fenicsx.shared():
         result = judging.judged(checked_bench(case, options, chosen), chosen, error_bars=options.error_bar)
-    alone = bool(case.candidate) and not chosen
+    alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     wanted = asked("run" if alone else "compare", case, options, "report", *who)
     text = "\n".join([comparison_text(result), *unturned(options, result.word)])

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.measured import CurrentMeasures
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, write, write_output
 from fem_reference.cli._cases import checked_bench, choose, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write, write_output
 from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import refinement

@@ -6,14 +6,13 @@ from pathlib import Path
 from fem_reference import solvers
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
+from fem_reference.cli import DONE, SOLVER_FAILED, write_output
 from fem_reference.cli._cases import asked, candidates, checked_bench, choose, compared, publish, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
 from fem_reference.report.asked import Part
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import recorded

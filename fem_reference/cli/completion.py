@@ -5,8 +5,7 @@ import argparse
 import shtab
 
 from fem_reference import solvers
-from fem_reference.cli import _parser
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, _parser, write_output
 from fem_reference.scenes import casefile
 
 HELP = "print what lets a shell complete verbs, options and names of cases"

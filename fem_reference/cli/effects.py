@@ -3,9 +3,9 @@
 import argparse
 
 from fem_reference.assessment.omissions import facts
+from fem_reference.cli import DONE, SOLVER_FAILED, out
 from fem_reference.cli._cases import asked, publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out
 from fem_reference.report import effects_page
 from fem_reference.scenes import casefile
 from fem_reference.studies import omissions

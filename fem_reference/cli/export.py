@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 
 from fem_reference import export
+from fem_reference.cli import DONE, SOLVER_FAILED, lines, out, write_output
 from fem_reference.cli._cases import checked_bench, choose, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_output
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
 from fem_reference.foundations.errors import InputError
@@ -67,9 +67,7 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states, where its solver has any; InputError where it was solved without them and is not to be solved
-    ``again``.
-    """
+    """The reference with its states; InputError where it was solved without them, unless it is to be solved ``again``."""
     choice = bench.scene.reference
     if not hasattr(bench.settings(choice, "reference"), "store_state"):
         return bench.reference()

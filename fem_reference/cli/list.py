@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference import metrics, solvers
-from fem_reference.cli._printing import DONE, out, write_output
+from fem_reference.cli import DONE, out, write_output
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING, Case

@@ -5,9 +5,9 @@ import argparse
 from fem_reference import solvers
 from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.cli._cases import compared, scene_of, unturned
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
 from fem_reference.report.overview import run_text

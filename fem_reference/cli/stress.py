@@ -3,9 +3,9 @@
 import argparse
 
 from fem_reference.assessment.stress import facts
+from fem_reference.cli import DONE
 from fem_reference.cli._cases import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part

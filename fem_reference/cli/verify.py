@@ -4,9 +4,9 @@ import argparse
 import time
 
 from fem_reference.assessment.catalogue import Verification
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL
 from fem_reference.cli._cases import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL
 from fem_reference.foundations.version import __version__
 from fem_reference.report import verify_page
 from fem_reference.report.asked import Asked, Part

@@ -24,9 +24,8 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     points, triangles = patches.points, patches.triangles
     longest = _longest_side(points, triangles)
     if len(triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
-        raise InputError(
-            patches.place, f"landmarks {longest:.4g} mm apart", "those around one attachment, in the unit stated"
-        )
+        got = f"landmarks {longest:.4g} mm apart"
+        raise InputError(patches.place, got, "those around one attachment, in the unit stated")
     while _longest_side(points, triangles) > _SIDE:
         points, triangles = igl.upsample(points, triangles)
     return Surface(distances(points, bone_surface).closest, triangles, patches.place)

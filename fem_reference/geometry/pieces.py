@@ -22,9 +22,7 @@ _QUARTERS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Pieces of the triangles of a surface: the ``parents`` (k,), the triangle of each piece, and the barycentric coordinates in
-    it of the ``corners`` (k, 3, 3) of the piece.
-    """
+    """Pieces of triangles: the ``parents`` (k,), their triangles, and their ``corners`` (k, 3, 3) in barycentric coordinates."""
 
     parents: Ints
     corners: Floats
@@ -42,9 +40,7 @@ class Pieces:
         return Pieces(np.concatenate(parents), np.concatenate(corners))
 
     def of(self, values: Floats) -> Floats:
-        """The values at the corners of the pieces (k, 3, d) of a field linear in triangles, with ``values`` (m, 3, d) at
-        theirs.
-        """
+        """Values (k, 3, d) at the corners of the pieces of a field linear in triangles, with ``values`` (m, 3, d) at theirs."""
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":
@@ -70,9 +66,7 @@ def edge_lengths(corners: Floats) -> Floats:
 
 
 def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:
-    """The ``triangles`` (k,) of a ``surface`` in pieces whose edges are on average at most ``apart`` [mm] long: large ones are
-    cut in four, or in two where they are thin.
-    """
+    """The ``triangles`` (k,) of a ``surface``, cut in four, or in two if thin, until their mean edge is at most ``apart`` [mm]."""
     corners, pieces = surface.points[surface.triangles], Pieces.whole(triangles)
     while (large := (lengths := edge_lengths(pieces.of(corners))).mean(axis=1) > apart).any():
         thin = large & (lengths.max(axis=1) ** 2 > _THIN * corner_areas(pieces.of(corners)))

@@ -77,23 +77,18 @@ def check_error_bars(bars: object, case: Case) -> None:
 def check_run(given: object, case: Case, place: str) -> None:
     """InputError unless it is a run of the ``case``, as far as it says of which."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
-    scene, place = run.origin.get("scene"), f'{place} "{run.name}"'
-    if scene is not None and scene not in (case.key, _as_solved(run, case).key):
+    scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
+    keys = {case.key}
+    if case.decisions and isinstance(effects, Mapping):  # of a run for which it was found out which it needs
+        acting = tuple(one.effect for one in case.decisions if one.effect.title in effects)
+        keys.add(case.model_copy(update={"effect": acting}).key)
+    if scene is not None and scene not in keys:
         got = f'a run of another case ("{run.origin.get("case", "without a name")}")'
         raise InputError(place, got, f'one of "{case.name}" with all its keys as they are')
     if run.carries.isdisjoint(case.carries):
         raise InputError(
             place, f"a run of {', '.join(sorted(run.carries))}", f"one of {', '.join(sorted(case.carries))}"
         )
-
-
-def _as_solved(run: Run, case: Case) -> Case:
-    """The ``case`` with the effects of a ``run``, where it was found out which it needs."""
-    effects = run.origin.get("effects")
-    if not case.decisions or not isinstance(effects, Mapping):
-        return case
-    acting = tuple(one.effect for one in case.decisions if one.effect.title in effects)
-    return case.model_copy(update={"effect": acting})
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:

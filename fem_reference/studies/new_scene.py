@@ -56,22 +56,11 @@ def copied(case: str, folder: Path) -> None:
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """A scene in a new ``folder`` that can be run, with the surfaces in mm; returns the unit that they were read in.
+    """A scene in a new ``folder``, which names it, with the surfaces in mm; returns the unit that they were read in.
 
-    Parameters
-    ----------
-    folder
-        Where it goes; its name is the name of the scene.
-    muscle, bones
-        Files of triangles. The muscle is attached to the two bones that it is nearest to, and the second of these moves.
-    unit
-        Of all of them, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones are.
-
-    Raises
-    ------
-    InputError
-        Names the file that cannot be used, or what cannot be guessed.
-
+    ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
+    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones.
+    InputError names the file that cannot be used, or what cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more: a muscle goes from one to another")
@@ -114,7 +103,7 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """The ``name`` on one line, without what is not printed, and not too long."""
+    """The ``name`` on one line, of printable characters, and not too long."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 

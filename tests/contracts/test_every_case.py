@@ -8,7 +8,7 @@ import pytest
 from fem_reference import cli, report
 from fem_reference.assessment.judge import MET
 from fem_reference.cli.demo import MAIN_JOB
-from fem_reference.cli.page import PAGES
+from fem_reference.cli.page import OCTAVE
 from fem_reference.geometry import skins
 from fem_reference.report import pages
 from fem_reference.scenes import casefile
@@ -62,7 +62,7 @@ def whole(name: str, *, with_negative_control: bool, folder, monkeypatch) -> tup
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize("name", FIELDS)
 def test_scalar_cases_meet_their_expectations_and_fail_with_their_negative_control(name, tmp_path, monkeypatch) -> None:
-    if name not in PAGES["octave-examples"][1]:  # the test of that page asks those
+    if name not in OCTAVE:  # the test of that page asks those
         status, facts = whole(name, with_negative_control=False, folder=tmp_path / "right", monkeypatch=monkeypatch)
         assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
     status, facts = whole(name, with_negative_control=True, folder=tmp_path / "wrong", monkeypatch=monkeypatch)
@@ -83,7 +83,7 @@ def test_the_page_of_the_octave_examples(tmp_path, monkeypatch) -> None:
     status = cli.main(["page", "octave-examples", "--out", str(tmp_path), "--json", str(target), "--quiet"])
     facts = json.loads(target.read_text())
     assert status == cli.DONE
-    assert [case["case"] for case in facts["cases"]] == list(PAGES["octave-examples"][1])
+    assert [case["case"] for case in facts["cases"]] == list(OCTAVE)
     for case in facts["cases"]:
         assert case["verdict"] == "pass"
         # scikit-fem and FEniCSx, the same elements on the same mesh: rounding.

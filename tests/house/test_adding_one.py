@@ -185,7 +185,7 @@ VERB = '''
 
 import argparse
 
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, write_output
 from fem_reference.scenes import casefile
 
 HELP = "how many cases there are"
@@ -261,7 +261,7 @@ KINDS = {
     ),
     "truth": New(
         {"validation/own_truth.py": TRUTH},
-        {"tests/verification/test_truths.py": 1},
+        {"tests/verification/test_parts.py": 1},
         {},
     ),
 }

@@ -17,8 +17,8 @@ from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept
@@ -36,19 +36,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings, 
 
 log = logging.getLogger(__name__)
 
-__all__ = [
-    "SOLVES",
-    "BodySettings",
-    "FieldSettings",
-    "Settings",
-    "check_effects",
-    "require",
-    "session",
-    "shared",
-    "solve",
-    "solve_body",
-    "solve_field",
-]
+__all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "solve_body", "solve_field"]
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
@@ -101,7 +89,7 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
         outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = (
-            "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
+            "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given): "
         )
         outcome = replace(outcome, message=begin + outcome.message)
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them

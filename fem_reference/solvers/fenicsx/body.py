@@ -15,6 +15,7 @@ from fem_reference.effects import Effect, Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
@@ -65,7 +66,7 @@ class AssembledBody:
         self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
-        self.contact = self.system.contact = self._contact(body, form) if body.contact else None
+        self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
         self.system.balance_units()
         self.path = Path(self.system, self.determinants)
         inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, self
@@ -80,13 +81,10 @@ class AssembledBody:
         """The condition of ``entry`` on this rank's unknowns."""
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
-        points = contact_points.on_skin(self.displacement, entry.on, self.local)
-        return PointSprings(self.unknowns, entry, points)
+        return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
 
-    def _contact(self, body: Body, form: forms.Form) -> ContactForces:
+    def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
         """The contact of bones with this rank's points."""
-        law = body.contact
-        assert law is not None  # called only where there is a law
         if isinstance(law.on, str):
             points = contact_points.on_facets(self.displacement, body.mesh, form.regions[law.on], form.degree)
         else:
@@ -159,13 +157,17 @@ class AssembledBody:
             self.contact.update(frame)
         proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
         if not proved:
-            self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.settle() if proved else self.contact.go_back()
-        if proved:
-            self.at = frame
-            self.path.settle(self.energy(), connected=False)
+            self.go_back(before)
+        else:
+            self.arrive(frame)
         return proved
+
+    def arrive(self, frame: float) -> None:
+        """Take the present state as that of ``frame``; no load step led to it."""
+        self.at = frame
+        if self.contact:
+            self.contact.settle()
+        self.path.settle(self.energy(), connected=False)
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
         """Register ``frame`` as solved earlier, with ``unknowns`` (n,) and negative ``modes``."""
@@ -177,11 +179,9 @@ class AssembledBody:
         """Take up the state of ``frame`` with ``unknowns`` (n,), as if it was just reached."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
-        self.at = frame
         if self.contact:
             self.contact.update(frame)
-            self.contact.settle()
-        self.path.settle(self.energy(), connected=False)
+        self.arrive(frame)
         if not recalled and self.stability is not None:  # an old factorisation remains in use
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
@@ -227,8 +227,7 @@ class AssembledBody:
         if self.stability is not None:
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 modes = self.stability.negative_modes()
-        if self.reuse and not self.clock.matters:
-            self.known.add(KnownState(self._acting(frame), np.array(self.unknowns.x.array), modes))
+        self.know(frame, np.array(self.unknowns.x.array), modes)
         self.modes = modes
         return modes
 

@@ -21,27 +21,14 @@ class PrescribedRegion:
         self.nodes = fem.locate_dofs_topological(displacement.space, 2, facets)
         self.rest: Floats = displacement.space.tabulate_dof_coordinates()[self.nodes]
         self.all = displacement.dofs[self.nodes]  # the unknowns (m, 3) of the nodes
+        self.dofs: Ints = np.ravel(self.all[:, self.along])  # prescribed exactly or by springs
+        self.exact = self.dofs if entry.stiffness is None else np.zeros(0, np.int64)
         self.wanted = fem.Function(displacement.space)
-
-    @property
-    def dofs(self) -> Ints:
-        """The unknowns (n,) that are prescribed, exactly or by springs."""
-        return np.ravel(self.all[:, self.along])
-
-    @property
-    def exact(self) -> Ints:
-        """The unknowns (n,) that are prescribed exactly: none by springs."""
-        return self.dofs if self.entry.stiffness is None else np.zeros(0, np.int64)
 
     @property
     def prescribed(self) -> Floats:
         """The values (n,) prescribed now for the unknowns ``dofs``."""
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
-
-    @property
-    def targets(self) -> Floats:
-        """The values (n,) prescribed for the unknowns ``exact``."""
-        return self.prescribed if self.entry.stiffness is None else np.zeros(0)
 
     def springs(self, form: Form) -> Any:
         """The weak form of springs that pull towards the prescribed displacement, 0 where it is exact."""
@@ -73,7 +60,6 @@ class PointSprings:
     """A ``Prescribed`` by springs at ``points`` of this rank's cells. The points are not unknowns, so none is exact."""
 
     exact: Ints = np.zeros(0, np.int64)
-    targets: Floats = np.zeros(0)
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
         assert entry.stiffness is not None  # body.check ensures it

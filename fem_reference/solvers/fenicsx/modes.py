@@ -72,9 +72,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
             body.contact.update(frame)
         found = body.newton.solve(frame)
         if found.converged and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
-            body.path.settle(body.energy(), connected=False)
-            if body.contact:
-                body.contact.settle()
+            body.arrive(frame)
             return float(abs(amount))
         body.go_back(before)
     body.system.linearise()

@@ -33,15 +33,14 @@ class Stability:
         in another costs nothing, and under a stress of several shear moduli the energy may fall that way although that of the
         material does not. The elements' displacements are a subset of the body's, which has at least this many modes.
         """
-        found = self._counted(pointwise=self.pressures > 0)
-        self._counted()  # the next solve finds the tangent and its factors unchanged
+        found = self.negative_modes(pointwise=self.pressures > 0)
+        self.negative_modes()  # the next solve finds the tangent and its factors unchanged
         return found
 
-    def negative_modes(self) -> float:
-        """The number of directions in which the energy falls from the present state; NaN where the tangent is singular."""
-        return self._counted()
-
-    def _counted(self, *, pointwise: bool = False) -> float:
+    def negative_modes(self, *, pointwise: bool = False) -> float:
+        """The number of directions in which the energy falls from the present state; NaN where the tangent is singular.
+        ``pointwise``: see ``cells``.
+        """
         self.system.linearise(pointwise=pointwise)
         try:
             return float(self.linear.negative_pivots() - self.pressures)

@@ -136,7 +136,7 @@ class System:
         """The unknowns minus their prescribed values (n,); 0 where nothing is prescribed."""
         found = np.zeros(self.size)
         for one in self.conditions:
-            found[one.exact] = self.unknowns.x.array[one.exact] - one.targets
+            found[one.exact] = self.unknowns.x.array[one.exact] - one.prescribed[: len(one.exact)]
         return found
 
     def lacking(self) -> bool:

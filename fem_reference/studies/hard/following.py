@@ -16,8 +16,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.problems.problem import NO_SURFACE
-from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.fields import VALUES
+from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
@@ -63,7 +62,10 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)
     check_not_stalled(outcome)
     if built.field is not None:
-        return outcome, _of_field(built.field, frames)
+        values = np.array([frame.field.arrays[VALUES] for frame in frames if frame.field])
+        boundary = built.field.fixed[np.isfinite(built.field.fixed)]
+        span = boundary.min(), boundary.max()
+        return outcome, Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=span)
     assert muscle is not None  # what is no field
     rest, mesh = muscle.surface.points, muscle.mesh
     if as_body:  # whose surface goes along with the tetrahedra
@@ -72,13 +74,6 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     if solvers.takes_effects(solver):
         outcome = second_check.confirmed_frames(muscle, frames, outcome, settings)
     return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(rest))])
-
-
-def _of_field(field: FieldProblem, frames: list[Frame]) -> Followed:
-    """The values of a scalar field, and the range of those on its boundary."""
-    values = np.array([frame.field.arrays[VALUES] for frame in frames if frame.field])
-    boundary = field.fixed[np.isfinite(field.fixed)]
-    return Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=(boundary.min(), boundary.max()))
 
 
 def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
@@ -156,9 +151,7 @@ def jittered(hard: Hard, number: int) -> Hard:
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """Compare ``count`` runs of a case on other meshes with the ``first``: all alike converged or not, and the greatest distance
-    over frames, in per cent of the body's size; at points of the same material.
-    """
+    """Compare ``count`` runs on other meshes with the ``first``: status, and greatest distance over frames [% of the size]."""
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
     ended, off, reached = Counter[str](), list[float](), list[int]()
     for number in range(1, count + 1):

@@ -65,9 +65,7 @@ class Posed:
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
-    """Every solver, or ``only`` these, on each of the cases; the reference first, which others may be measured against, and
-    ``in_steps`` of 1, 10 and 40 to each case's farthest frame, and on so many other meshes.
-    """
+    """Every solver, or ``only`` these, on each case, the reference first; it also ``in_steps`` and on so many ``jitters``."""
     begin, cells = time.perf_counter(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     with fenicsx.shared():
@@ -106,9 +104,8 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """_Late where what is done meanwhile takes longer of this process's processor time, StalledError where it takes many times that
-    by the clock, as far as it is in the main thread and lets itself be interrupted; processes of the reference have a limit of
-    their own.
+    """Raise _Late after so many seconds of this process's processor time, and StalledError after many times as long by the clock,
+    in the main thread; processes of the reference have a limit of their own.
     """
 
     def late(*_: object) -> None:
@@ -177,9 +174,7 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The picture of the frame that decided, of a run that ended before all of them the last one, with the place that its message
-    names; None of what has no surface, or is not finite.
-    """
+    """The deciding frame (of an unfinished run its last) as a picture with the named place; None without a finite surface."""
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
     points, history = followed.positions[i], found.history
