@@ -8,8 +8,7 @@ import numpy as np
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Ints
 from fem_reference.metrics import Measure
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 
 
 def frames(run: Run) -> Ints:

@@ -15,8 +15,8 @@ from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import amend
-from fem_reference.runs.cut_off import places
 from fem_reference.runs.store import Frame, Outcome, Run, collected
+from fem_reference.runs.writer import places
 
 log = logging.getLogger(__name__)
 

@@ -12,8 +12,7 @@ from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
 from fem_reference.report.asked import Part
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import recorded

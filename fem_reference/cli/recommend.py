@@ -10,7 +10,7 @@ from fem_reference.cli import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.cli._cases import scene_of
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
-from fem_reference.report.recommendation_texts import facts
+from fem_reference.report.recommendation_texts import facts, text
 from fem_reference.report.study_page import MAIN
 from fem_reference.scenes import casefile
 from fem_reference.studies import cost

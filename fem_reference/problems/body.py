@@ -199,9 +199,7 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which a load step ends, so that none skips over motion within it; InputError where a path cannot be
-        followed.
-        """
+        """Frame numbers at which load steps end, to skip no motion; InputError where a path cannot be followed."""
         things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)

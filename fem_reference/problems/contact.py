@@ -1,4 +1,4 @@
-"""Contact with bones: the obstacles of a body, and the law of the contact pressure."""
+"""Contact with bones: the bones around a body, and the law of the contact pressure."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -26,9 +26,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ContactBone:
-    """An obstacle: its ``shape`` in its own rest frame, and its ``pose``, a callable from a frame number to its 4 x 4 matrix;
-    both picklable.
-    """
+    """A bone: its ``shape`` at rest, and its ``pose``, from a frame number to a 4 x 4 matrix; both picklable."""
 
     name: str
     shape: Obstacle

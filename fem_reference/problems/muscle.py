@@ -181,9 +181,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def _filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher preserves it, else those
-    under it.
-    """
+    """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())

@@ -19,7 +19,7 @@ from fem_reference.geometry.signed_distance import cached
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import AtRest, Task
 
-# Up to here [mm] from a bone the distance to it is meant.
+# Distances to a bone are computed up to here [mm] from it.
 DISTANCE_MARGIN = 12.0
 
 
@@ -30,8 +30,8 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
-    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
+    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its vertices.
     """
 
     name: str
@@ -56,9 +56,7 @@ class Bone:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
-    (None) exactly.
-    """
+    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
 
     attachment: str
     bone: Bone

@@ -18,7 +18,7 @@ from fem_reference.report.gallery import Figure, Shot, ramp, ticks
 from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
 from fem_reference.report.words import number, title_of
-from fem_reference.runs.reached import seconds_per_frame
+from fem_reference.runs.store import seconds_per_frame
 
 MOST_CURVES = 8
 

@@ -18,8 +18,7 @@ from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, known, sum
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
-from fem_reference.runs.reached import seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, seconds_per_frame
 
 
 def page(comparison: Comparison) -> Page:

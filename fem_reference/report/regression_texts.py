@@ -26,15 +26,10 @@ def facts(check: Check) -> dict[str, Any]:
         "judgements": [
             {
                 "verdict": one.word,
-                "question": one.question,
                 "statistic": one.name,
-                "unit": one.unit,
-                "frame": one.frame,
-                "was": finite(one.was),
-                "current": finite(one.current),
-                "allowed": finite(one.allowed),
+                **{name: getattr(one, name) for name in ("question", "unit", "frame", "why")},
+                **{name: finite(getattr(one, name)) for name in ("was", "current", "allowed")},
                 "known_to": finite(one.known),
-                "why": one.why,
             }
             for one in check.judgements
         ],

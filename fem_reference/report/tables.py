@@ -121,16 +121,9 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
     expectation = verdict.expectation
     return {
         "verdict": verdict.word,
-        "of": expectation.of,
-        "metric": expectation.metric,
-        "statistic": expectation.statistic,
+        **{name: getattr(expectation, name) for name in ("of", "metric", "statistic", "kind", "because")},
+        **{name: getattr(verdict, name) for name in ("frame", "truth", "within", "unit")},
         "expected_at": expectation.frame,
-        "frame": verdict.frame,
         "value": finite(verdict.value),
-        "truth": verdict.truth,
-        "within": verdict.within,
-        "unit": verdict.unit,
         "error_bar": None if verdict.error_bar is None else finite(verdict.error_bar),
-        "kind": expectation.kind,
-        "because": expectation.because,
     }

@@ -15,8 +15,7 @@ from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import made_with
-from fem_reference.runs.reached import complete, seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete, seconds_per_frame
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, each

@@ -18,8 +18,7 @@ from fem_reference.geometry.field_mesh import l2_distance
 from fem_reference.problems import of_case, scalar
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.scenes.scalar import Element, ScalarCase
 from fem_reference.studies import refinement

@@ -18,10 +18,10 @@ from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.stresses import Watch
-from fem_reference.runs import cut_off, states, store
+from fem_reference.runs import states, store
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Frame, Outcome, Run
-from fem_reference.runs.writer import Writer
+from fem_reference.runs.writer import Writer, places
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.protocol import AnySolver
 
@@ -88,7 +88,7 @@ def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple
     """The effects that matter at each of the frames ``numbers`` that a ``folder`` stores, as ``watch`` sees them anew."""
     watch.frames.clear()
     for number in numbers:
-        yield watch.see(number, *cut_off.places(folder, number))
+        yield watch.see(number, *places(folder, number))
 
 
 def _stop_for(found: Sequence[Decision]) -> None:

@@ -22,8 +22,7 @@ from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import context_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer as on_finer_cells
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx

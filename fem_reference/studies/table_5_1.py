@@ -9,8 +9,7 @@ from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.metrics import Measure, context_of, in_tables, measure
 from fem_reference.runs.key import versions
-from fem_reference.runs.reached import complete, seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete, seconds_per_frame
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement

@@ -9,8 +9,7 @@ from pathlib import Path
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.metrics import MeasurementContext, change, context_of, measure
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import each

@@ -15,8 +15,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
-from fem_reference.verification.parts import clamped, nearest, neo_hooke, ramp, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, control, find, nearest, neo_hooke, ramp, sliding
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
@@ -113,8 +112,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_nearly_incompressible",
         title="Cook's membrane at small strain, Poisson's ratio 0.4999: tip by quadratic tetrahedra with a pressure",
         given={**NEARLY, "element": "P2/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **control(LINEAR, element="P1"),
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.005,
         because="discretisation, limited by the singular clamped corners: 0.16 % too stiff",
@@ -133,8 +131,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_constant_pressure",
         title="The same by linear hexahedra with a constant pressure",
         given={**NEARLY, "element": "Q1/P0"},
-        negative_control="linear hexahedra without a pressure",
-        wrong={"element": "Q1"},
+        **control("linear hexahedra without a pressure", element="Q1"),
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.015,
         because="discretisation by linear cells: 0.5 % too stiff",
@@ -144,8 +141,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_stabilised",
         title="The same by linear tetrahedra with a linear pressure that is stabilised",
         given={**NEARLY, "element": "P1/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **control(LINEAR, element="P1"),
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.04,
         because="discretisation by linear cells: 22, 7.7 and 2.2 % too stiff in 8, 16 and 32 cells a side",
@@ -189,8 +185,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P1"},
-        negative_control="quadratic tetrahedra with a pressure",
-        wrong={"element": "P2/P1"},
+        **control("quadratic tetrahedra with a pressure", element="P2/P1"),
         truth=LOCKED / 2,
         within=LOCKED / 2,
         because="the band is all from 0 to 0.5: less than half of the displacement is called locked; how much less is no truth",
@@ -203,8 +198,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **control(LINEAR, element="P1"),
         truth=1.0,
         within=0.01,
         because="discretisation: 0.8 % too stiff in 8 by 8 cells",

@@ -18,8 +18,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
-from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
@@ -184,8 +183,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=blown,
         given={"reading": AT_STRETCH, "n": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        negative_control="neo-Hookean material of the same shear modulus",
-        wrong={"material": NEO_HOOKE},
+        **control("neo-Hookean material of the same shear modulus", material=NEO_HOOKE),
         truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
@@ -198,8 +196,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=pressed,
         given={"mu": MU},
-        negative_control="the shear modulus is 1 % too large",
-        wrong={"mu": 1.01 * MU},
+        **control("the shear modulus is 1 % too large", mu=1.01 * MU),
         truth=true_pressed,
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
@@ -245,8 +242,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=tube_pressure,
         given={"element": "Q2/Q1"},
-        negative_control="one end of the tube is free to move along it",
-        wrong={"ends": ("bottom",)},
+        **control("one end of the tube is free to move along it", ends=("bottom",)),
         truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",

@@ -14,8 +14,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells
-from fem_reference.verification.parts import clamped, neo_hooke, ramp, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, find, neo_hooke, ramp, sliding
 
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]

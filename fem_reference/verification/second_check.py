@@ -15,6 +15,7 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Run
 from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
+from fem_reference.verification.parts import control
 
 Mistake = Callable[[MuscleProblem, Run], tuple[MuscleProblem, Run]]
 
@@ -115,8 +116,7 @@ ENTRIES = tuple(
         unit="1",
         measure=denials,
         given={},
-        negative_control=words,
-        wrong={"mistake": mistake},
+        **control(words, mistake=mistake),
         truth=0.0,
         within=0.5,
         because="it counts the checks that are not met",

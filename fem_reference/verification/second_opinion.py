@@ -21,7 +21,7 @@ from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, farthest, ramp, resistance
+from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, control, farthest, ramp, resistance
 from fem_reference.verification.patch import patch
 
 
@@ -141,8 +141,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, withi
         unit="1",
         measure=agreement,
         given={"body": body, "element": element, "residual": 1e-13, "quadrature": None},
-        negative_control="in scikit-fem the first modulus is 1 % too large",
-        wrong={"error": 0.01},
+        **control("in scikit-fem the first modulus is 1 % too large", error=0.01),
         truth=0.0,
         within=within,
         because=because,

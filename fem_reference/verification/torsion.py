@@ -7,8 +7,7 @@ from fem_reference.effects import Effect
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Turn
-from fem_reference.verification.parts import clamped, mooney_rivlin, neo_hooke
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, control, find, mooney_rivlin, neo_hooke
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The truths are of incompressible material.
 MU, BULK = 0.01, 1e4
@@ -59,8 +58,7 @@ SQUARE = partial(
     group="torsion",
     unit="N mm2",
     measure=square_bar,
-    negative_control="the ends are kept plane, as a round bar would keep them",
-    wrong={"turned": (0, 1, 2)},
+    **control("the ends are kept plane, as a round bar would keep them", turned=(0, 1, 2)),
     truth=lambda: find("torsion").square_bar_stiffness(MU, SIDE),
     relative=True,
     kind="closed form",
@@ -75,8 +73,7 @@ ENTRIES: tuple[Entry, ...] = (
             title=f"Twisting a cylinder by half a radian: the moment, by curved {cells} ({element})",
             unit="N mm",
             given={"end": "moments", "element": element, "material": NEO_HOOKE},
-            negative_control="straight cells, whose surface has flat facets",
-            wrong={"degree": 1},
+            **control("straight cells, whose surface has flat facets", degree=1),
             truth=TWISTED.moment,
             within=within,
             because=f"discretisation of order 4, {left} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
@@ -108,8 +105,7 @@ ENTRIES: tuple[Entry, ...] = (
         title="Twisting a Mooney-Rivlin cylinder by half a radian: the moment",
         unit="N mm",
         given={"end": "moments", "rings": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        negative_control="c2 is 1 % too large",
-        wrong={"material": mooney_rivlin(C1, 1.01 * C2, BULK)},
+        **control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, BULK)),
         truth=TWISTED_MOONEY_RIVLIN.moment,
         within=5e-4,
         because="discretisation of order 4, 8e-5 with 4 cells along the radius (Q2/Q1)",

@@ -261,7 +261,7 @@ KINDS = {
     ),
     "truth": New(
         {"validation/own_truth.py": TRUTH},
-        {"tests/verification/test_truths.py": 1},
+        {"tests/verification/test_parts.py": 1},
         {},
     ),
 }

@@ -16,7 +16,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.problems.problem import NO_SURFACE
-from fem_reference.runs.fields import VALUES
+from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
