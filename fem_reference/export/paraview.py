@@ -103,7 +103,7 @@ class _Frames:
                 pressures[i] = np.nan
                 continue
             for bone in bones:
-                pressures[i] += law.pressure(local_fields.to_bone(bone, number, points))[0]
+                pressures[i] += law.pressure(bone.distances(number, points))[0]
         return np.where(self.setup.free, pressures, 0.0)
 
     def blocks(self, i: int) -> Tree:

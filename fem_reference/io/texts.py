@@ -4,6 +4,7 @@ A file is refused where it is no such text, is too large, is nested deeper than 
 """
 
 import json
+import math
 import re
 import tomllib
 from collections.abc import Callable
@@ -74,6 +75,15 @@ def beside(path: Path, name: str) -> Path:
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
     return found
+
+
+def finite(value: float) -> float | None:
+    """``value`` for JSON: None where it is not finite.
+
+    >>> finite(2), finite(float("nan"))
+    (2.0, None)
+    """
+    return float(value) if math.isfinite(value) else None
 
 
 def is_file(path: Path) -> bool:

@@ -65,8 +65,8 @@ class ContactLaw:
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
-    ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
+    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm]
+    from their ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)

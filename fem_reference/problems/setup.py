@@ -11,7 +11,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
-from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.sectors import attached_shares
@@ -30,8 +30,9 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
-    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its vertices.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of
+    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its
+    vertices.
     """
 
     name: str
@@ -52,6 +53,10 @@ class Bone:
     def pose(self, frame: float) -> Floats:
         """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
+
+    def distances(self, frame: float, points: Floats) -> Floats:
+        """Distance (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
+        return self.shape.sample(apply(np.linalg.inv(self.pose(frame)), points)).distance
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,5 @@
-"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and those that
-effects which a case left out would add.
+"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and
+those that effects which a case left out would add.
 """
 
 from collections.abc import Callable, Sequence
@@ -119,8 +119,9 @@ class WatchedFrame:
 class Watch:
     """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
 
-    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that act. While
-    a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the greatest there was.
+    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
+    act. While a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the
+    greatest there was.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

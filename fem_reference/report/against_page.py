@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.mesh import Floats
+from fem_reference.io.texts import finite
 from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
 from fem_reference.report.gallery import Figure, Shot, ramp, ticks
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.report.words import number, title_of
 from fem_reference.runs.store import seconds_per_frame
 

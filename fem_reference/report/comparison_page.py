@@ -4,8 +4,7 @@ from collections import Counter
 from functools import partial
 from typing import Any
 
-from fem_reference.assessment import reached
-from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.comparison import Comparison, reached, reached_frames
 from fem_reference.metrics import described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
@@ -24,7 +23,7 @@ from fem_reference.runs.store import Run, seconds_per_frame
 def page(comparison: Comparison) -> Page:
     """The page of a comparison; of a reference that failed, over the frames that it reached."""
     numbers, failed = summary(comparison), _failed(comparison)
-    nothing, comparison = not len(reached.frames(comparison.reference)), reached.cut(comparison)
+    nothing, comparison = not len(reached_frames(comparison.reference)), reached(comparison)
     shared, said = _shared(comparison), headlines(comparison)
     shown = [
         template(f"sections/{name}.html").render(shared | facts_of(name, comparison))
@@ -48,7 +47,7 @@ def _failed(comparison: Comparison) -> str:
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
-    kept = reached.frames(reference)
+    kept = reached_frames(reference)
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
         return f"{why} No frame was reached, so that nothing could be measured against it."

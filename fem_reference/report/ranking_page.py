@@ -10,10 +10,10 @@ from matplotlib.ticker import LogLocator
 
 from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
+from fem_reference.io.texts import finite
 from fem_reference.metrics import described
 from fem_reference.report.drawings import PALETTE, REFERENCE, Drawing, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())

@@ -6,7 +6,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
-from fem_reference.report.tables import finite
+from fem_reference.io.texts import finite
 
 # A pull request is read by people: the worst judgements, and how many there are.
 MOST_ROWS = 15

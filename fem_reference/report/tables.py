@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -10,6 +9,7 @@ from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Alone, Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
+from fem_reference.io.texts import finite
 from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
@@ -71,15 +71,6 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
-
-
-def finite(value: float) -> float | None:
-    """``value``, or None where it is not finite.
-
-    >>> finite(2), finite(float("nan"))
-    (2.0, None)
-    """
-    return float(value) if math.isfinite(value) else None
 
 
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:

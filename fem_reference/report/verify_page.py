@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment.catalogue import Result, Verification
+from fem_reference.io.texts import finite
 from fem_reference.report import verify_figures
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.report.words import duration
 
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
+from fem_reference.io.texts import finite
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.setup import Bone
 from fem_reference.report.at_frames import motions
-from fem_reference.report.tables import finite
 from fem_reference.runs.store import Run
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each

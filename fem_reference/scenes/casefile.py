@@ -192,8 +192,8 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface. A
-    bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
+    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the
+    surface. A bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
     """
     acting = [(name, getattr(effect, "on", "")) for name, effect in zip(names, effects, strict=True)]
     known = [moduli([effect]) for effect in effects]

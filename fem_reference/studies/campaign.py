@@ -113,7 +113,7 @@ def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
 
 
 def _made(trial: Trial, store: Path) -> Made:
-    """A trial with its result; bad input and what is not installed are no reason to give up the others."""
+    """A trial with its result; bad input or a missing package ends this trial alone."""
     try:
         return Made(trial, solve(trial, store))
     except (InputError, MissingSoftware) as error:

@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class Bench[C: Case]:
-    """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
+    """A case with its set-up and its problem, each made once and only when it is needed, and the store of its runs."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
         self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))

@@ -103,7 +103,7 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """The ``name`` on one line, without what is not printed, and not too long."""
+    """The ``name`` on one line, of printable characters, and not too long."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 

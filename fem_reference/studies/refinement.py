@@ -50,9 +50,9 @@ Vary = Callable[[MuscleCase], MuscleCase]
 
 
 def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
-    """Changes that each halve one cause of numerical error apart from tetrahedra, by name: of contact its stiffness and smoothing,
-    and how well the distances to surfaces of bones are known and how far they are rounded, unless no bone ``pressed``; load
-    steps, where the reference's ``settings`` have them, with drag or viscosity only: else a state does not depend on them.
+    """Changes by name that each halve one cause of numerical error beside tetrahedra: the compliance and smoothing of contact, and
+    the error and rounding of distances to bones, unless no bone ``pressed``; load steps, where the ``settings`` have them, with
+    drag or viscosity only: else a state does not depend on them.
     """
     found, contact = dict[str, Vary](), among(case.effects)
     if contact is not None and pressed:
@@ -111,7 +111,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run) -> ErrorBars | None:
-    """The error bars stored beside a reference run, None without any that are of this run and of these metrics."""
+    """The error bars stored beside a reference run; None where there are none, or they are of another run or of other metrics."""
     if reference.folder is None:
         return None
     bars = error_bars.load(reference.folder, _of(reference))

@@ -104,9 +104,8 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """_Late where what is done meanwhile takes longer of this process's processor time, StalledError where it takes many times that
-    by the clock, as far as it is in the main thread and lets itself be interrupted; processes of the reference have a limit of
-    their own.
+    """Raise _Late after so many seconds of this process's processor time, and StalledError after many times as long by the clock,
+    in the main thread; processes of the reference have a limit of their own.
     """
 
     def late(*_: object) -> None:
