@@ -1,6 +1,7 @@
 """The command line: the only place that prints, shows progress and exits."""
 
 import argparse
+import builtins
 import json
 import logging
 import os
@@ -120,7 +121,7 @@ def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
     for key, value in facts.items():
         if isinstance(value, dict):
             printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
-        elif isinstance(value, list):
+        elif isinstance(value, builtins.list):  # list is a module here, once imported
             printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
         else:
             printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
