@@ -43,6 +43,7 @@ KINDS = {
     "a stiffness per area": Kind("MPa/mm", ('"100 kPa/mm"',)),
     "a damping per volume": Kind("MPa*s/mm^2", ('"1 Pa s/mm^2"',)),
     "a viscosity": Kind("MPa*s", ('"300 kPa s"',)),
+    "a force": Kind("N", ('"800 N"',)),
     "a stiffness": Kind("N/mm", ('"200 N/m"',)),
     "a damping": Kind("N*s/mm", ('"0.1 N s/m"',)),
     "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
@@ -139,6 +140,7 @@ PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pr
 PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
 AreaStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness per area"))]
 VolumeDamping = Annotated[float, BeforeValidator(partial(positive, kind="a damping per volume"))]
+Force = Annotated[float, BeforeValidator(partial(positive, kind="a force"))]
 Stiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness"))]
 Viscosity = Annotated[float, BeforeValidator(partial(positive, kind="a viscosity"))]
 BendingStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a bending stiffness"))]

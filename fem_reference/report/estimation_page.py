@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.geometry.curves import TECHNIQUES
+from fem_reference.io.texts import finite
 from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.studies.estimation import CurveError, Estimation
 
 # Control points in the plane, as in the report's Figure 3.1.

@@ -136,6 +136,7 @@ def test_types_say_their_unit() -> None:
         "AreaStiffness": "MPa/mm",
         "VolumeDamping": "MPa*s/mm^2",
         "Viscosity": "MPa*s",
+        "Force": "N",
         "Stiffness": "N/mm",
         "BendingStiffness": "N*mm",
         "Rate": "1/s",

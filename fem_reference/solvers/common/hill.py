@@ -1,0 +1,161 @@
+"""A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
+
+Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0; velocities of shortening are positive,
+as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), the structure is Zajac's (1989), and the hyperbola (5.1)
+is Hill's: its constants follow from a / F0 and the greatest velocity, ``b = a / F0 vmax``.
+"""
+
+import math
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import Angle, Force, PositiveLength
+
+# Thelen 2003, young adults: width of the active curve; shape of the passive one and its strain at F0; the strain of the tendon at
+# F0; the greatest force of lengthening.
+_WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
+# The tendon's toe ends at this share of F0, with this shape; beyond it is linear (same place).
+_TOE, _TOE_SHAPE = 0.33, 3.0
+# Fibres are sought between these lengths; velocities are found to this share of F0.
+_SHORTEST, _LONGEST = 0.1, 3.0
+_LEAST = 1e-3  # activation, without which no velocity follows from a force
+
+
+class Hill(Record):
+    """A muscle and its tendon.
+
+    ``max_force``: F0, isometric [N]; ``optimal_length``: l0 of the fibres [mm]; ``slack_length``: of the tendon [mm];
+    ``pennation``: the angle of fibres at their optimal length [rad]; ``max_velocity``: of shortening without load [l0 / s];
+    ``curvature``: a / F0 of (5.1).
+    """
+
+    max_force: Force
+    optimal_length: PositiveLength
+    slack_length: PositiveLength
+    pennation: Annotated[Angle, Field(ge=0, lt=1.2)] = 0.0
+    max_velocity: Annotated[float, Field(gt=0)] = 10.0
+    curvature: Annotated[float, Field(gt=0, le=1)] = 0.25
+
+    @property
+    def thickness(self) -> float:
+        """The distance [l0] between the two layers that fibres join, which stays."""
+        return math.sin(self.pennation)
+
+    def cosine(self, fibre: float) -> float:
+        """The cosine of the pennation angle at a ``fibre`` length [l0]."""
+        return math.sqrt(max(1 - (self.thickness / fibre) ** 2, 0.0))
+
+    def tendon_force(self, path: float, fibre: float) -> float:
+        """The force [F0] of the tendon of a ``path`` [mm] from origin to insertion with a ``fibre`` length [l0]."""
+        along = self.optimal_length * fibre * self.cosine(fibre)
+        return tendon((path - along) / self.slack_length - 1)
+
+    def imbalance(self, path: float, fibre: float, activation: float, velocity: float = 0.0) -> float:
+        """The force [F0] of the fibres along the tendon less that of the tendon; ``velocity`` of shortening [l0 / s]."""
+        contractile = activation * active(fibre) * hyperbola(velocity / self.max_velocity, self.curvature)
+        return (contractile + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
+
+    def static(self, path: float, activation: float) -> tuple[float, float]:
+        """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
+        tendon has no force. InputError where fibres would be shorter than a tenth.
+        """
+        low = max(_SHORTEST, 1.0001 * self.thickness)
+        if self.tendon_force(path, low) == 0:
+            return 0.0, low
+        lengths = np.linspace(low, _LONGEST, 400)
+        pulls = np.array([self.imbalance(path, one, activation) for one in lengths]) > 0
+        found = int(np.argmax(pulls))
+        if found == 0:
+            raise InputError(
+                "hill", f"a path of {path:.4g} mm", "one on which fibres keep a tenth of their optimal length"
+            )
+        bracket = lengths[found - 1], lengths[found]
+        fibre = float(brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
+        return self.max_force * self.tendon_force(path, fibre), fibre
+
+    def velocity(self, path: float, fibre: float, activation: float) -> float:
+        """The velocity of shortening [l0 / s] of fibres whose force is in equilibrium with the tendon's."""
+        cosine = max(self.cosine(fibre), 1e-6)
+        force = (self.tendon_force(path, fibre) / cosine - passive(fibre)) / (max(activation, _LEAST) * active(fibre))
+        return self.max_velocity * inverse_hyperbola(force, self.curvature)
+
+    def follow(
+        self, times: Floats, paths: Floats, activations: Floats, tolerance: float = 1e-9
+    ) -> tuple[Floats, Floats]:
+        """Forces (n,) [N] and fibre lengths (n,) [l0] at ``times`` (n,) [s], from equilibrium at the first; ``paths`` (n,) [mm] and
+        ``activations`` (n,) are linear in between.
+        """
+        _, first = self.static(float(paths[0]), float(activations[0]))
+
+        def rate(time: float, fibre: Floats) -> list[float]:
+            path, activation = (float(np.interp(time, times, values)) for values in (paths, activations))
+            return [-self.velocity(path, float(fibre[0]), activation)]
+
+        lengths = [first]
+        for start, end in pairwise(times):  # each with its own slopes
+            found = solve_ivp(rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance)
+            lengths.append(float(found.y[0, -1]))
+        forces = [
+            self.max_force * self.tendon_force(float(path), one) for path, one in zip(paths, lengths, strict=True)
+        ]
+        return np.array(forces), np.array(lengths)
+
+
+def active(fibre: float) -> float:
+    """The greatest contractile force [F0] at a ``fibre`` length [l0]: 1 at the optimal one."""
+    return math.exp(-((fibre - 1) ** 2) / _WIDTH)
+
+
+def passive(fibre: float) -> float:
+    """The force [F0] of the parallel element at a ``fibre`` length [l0]: 0 up to the optimal one."""
+    return max(math.expm1(_PASSIVE * (fibre - 1) / _PASSIVE_STRAIN) / math.expm1(_PASSIVE), 0.0)
+
+
+def tendon(strain: float) -> float:
+    """The force [F0] of the tendon: 0 where it is slack, an exponential toe, then linear with the same slope."""
+    toe = _toe_strain()
+    if strain <= 0:
+        return 0.0
+    if strain <= toe:
+        return _TOE * math.expm1(_TOE_SHAPE * strain / toe) / math.expm1(_TOE_SHAPE)
+    return _TOE + (1 - _TOE) * (strain - toe) / (_TENDON_STRAIN - toe)
+
+
+def _toe_strain() -> float:
+    """The strain at which toe and line have the same slope."""
+    slope = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times toe strain
+    return _TENDON_STRAIN * slope / (slope + 1 - _TOE)
+
+
+def hyperbola(velocity: float, curvature: float) -> float:
+    """The force, as a share of the isometric one, at a ``velocity`` of shortening as a share of the greatest: (5.1) solved for F.
+
+    Lengthening (negative) it rises to 1.4 by a hyperbola with the same slope at 0 (Katz 1939).
+    """
+    if velocity >= 0:
+        return (1 - velocity) / (1 + velocity / curvature)
+    rise = _LENGTHENING - 1
+    slope = 1 + 1 / curvature
+    return 1 + rise * slope * -velocity / (rise + slope * -velocity)
+
+
+def inverse_hyperbola(force: float, curvature: float) -> float:
+    """The velocity of shortening, as a share of the greatest, at a ``force``; beyond the hyperbola's ends along its tangents."""
+    slope, rise = 1 + 1 / curvature, _LENGTHENING - 1
+    if force < 0:  # shortens faster than without load
+        return 1 - force * (1 + 1 / curvature)
+    if force <= 1:
+        return (1 - force) / (1 + force / curvature)
+    most = 1 + 0.95 * rise
+    inner = min(force, most)
+    found = -rise * (inner - 1) / (slope * (rise - (inner - 1)))
+    steep = rise**2 / (slope * (rise - (most - 1)) ** 2)
+    return found - steep * max(force - most, 0.0)
