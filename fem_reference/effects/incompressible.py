@@ -2,12 +2,10 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, Moduli, State
-from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.units import PositivePressure
+from fem_reference.effects import State, VolumeLaw
 
 
-class Incompressible(Energy):
+class Incompressible(VolumeLaw):
     """``p (J - 1) - p^2 / (2 K)``: the perturbed Lagrangian whose stationary point in p is ``p = K (J - 1)``.
 
     ``bulk``: bulk modulus K [MPa]. Source: Sussman and Bathe 1987, doi 10.1016/0045-7949(87)90265-3, with U = K/2 (J - 1)^2.
@@ -19,16 +17,6 @@ class Incompressible(Energy):
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)
-    example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
-    bulk: PositivePressure
-
-    def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
-        return (Limit("V/V0", 0.5, 2.0),)
-
-    def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
-        return Moduli(bulk=self.bulk)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells
 from fem_reference.problems.paths import Along
-from fem_reference.verification.parts import clamped, control, find, nearest, ramp, resistance, sliding
+from fem_reference.verification.parts import SLOW, clamped, control, find, nearest, ramp, resistance, sliding
 
 land = find("land")
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
@@ -108,8 +108,7 @@ HEART = partial(
     kind="published",
     source="Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py",
     refinement=Refinement((2, 3), AROUND, order=None),  # the truth is published with few digits: no order
-    slow=True,
-    slow_negative_control=True,
+    **SLOW,
 )
 APICES = {"inside": (0, ENDO), "outside": (1, EPI)}
 FINE = "the mesh leaves 0.2 %"
