@@ -16,7 +16,7 @@ from benchmarks.candidates import SOLVERS, per_iteration, spent
 from benchmarks.power_law import PowerLaw, fit
 from benchmarks.reference import solve_fusiform
 from fem_reference import solvers
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
 from fem_reference.problems import setup as problem_setup
 from fem_reference.solvers import fenicsx
 

@@ -14,7 +14,7 @@ from benchmarks.bodies import fusiform
 from fem_reference import solvers
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.usage import processor_times
+from fem_reference.foundations.subprocesses import processor_times
 from fem_reference.problems.body import Body
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile

@@ -100,7 +100,7 @@ def check(path: Path, case: MuscleCase, candidate: str) -> None:
 
 
 def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
-    """The baseline in ``path``; InputError where there is none, or it is damaged, or of another case, scene or candidate."""
+    """The baseline in ``path``; InputError where it is missing, damaged, or of another case, scene or candidate."""
     baseline = _read(path)
     _check_whose(path, baseline, case, candidate)
     if baseline.scene != case.key:
@@ -118,7 +118,28 @@ def update(path: Path, current: CurrentMeasures) -> Baseline:
     """
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
-    baseline = _made(current, before)
+    kept = {} if before is None else before.measures
+    vertices = sample(current.rest, SAMPLED)
+    baseline = Baseline(
+        candidate=current.candidate.name,
+        case=current.scene.name,
+        fem_reference=__version__,
+        format=1,
+        frames=current.candidate.numbers,
+        measures={
+            name: _stored(one, current.bars(name), kept.get(name))
+            for name, one in current.by_name.items()
+            if before is None or name in kept
+        },
+        positions=Positions(
+            tolerance=MOVED if before is None else before.positions.tolerance,
+            values=tuple(tuple(_rounded(point) for point in frame[vertices]) for frame in current.points),
+            vertices=tuple(vertices.tolist()),
+        ),
+        readme=README,
+        reference=current.reference_name,
+        scene=current.scene.key,
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     files.write_text(path, text(baseline.model_dump(mode="json")) + "\n")
     log.info("baseline: %s, %d statistics of %d frames", path, len(baseline.measures), len(baseline.frames))
@@ -141,7 +162,7 @@ def _check_shape(place: str, baseline: Baseline) -> None:
     known, frames = metrics.units(), len(baseline.frames)
     for name, stored in baseline.measures.items():
         if known.get(name) != stored.unit:
-            want = f"a statistic that there is, in {known[name]}" if name in known else "a statistic that there is"
+            want = "a statistic that there is" + (f", in {known[name]}" if name in known else "")
             raise InputError(f"{place}: measures.{name}", f'one in "{stored.unit}"', want)
         if len(stored.values) != frames:
             raise InputError(
@@ -158,32 +179,6 @@ def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: st
     for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
-
-
-def _made(current: CurrentMeasures, before: Baseline | None) -> Baseline:
-    kept = {} if before is None else before.measures
-    vertices = sample(current.rest, SAMPLED)
-    positions = Positions(
-        tolerance=MOVED if before is None else before.positions.tolerance,
-        values=tuple(tuple(_rounded(point) for point in frame[vertices]) for frame in current.points),
-        vertices=tuple(int(vertex) for vertex in vertices),
-    )
-    return Baseline(
-        candidate=current.candidate.name,
-        case=current.scene.name,
-        fem_reference=__version__,
-        format=1,
-        frames=current.candidate.numbers,
-        measures={
-            name: _stored(one, current.bars(one.metric, one.statistic), kept.get(name))
-            for name, one in current.by_name.items()
-            if before is None or name in kept
-        },
-        positions=positions,
-        readme=README,
-        reference=current.reference_name,
-        scene=current.scene.key,
-    )
 
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:

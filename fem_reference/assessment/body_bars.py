@@ -32,19 +32,9 @@ class BodyBars:
 
 
 def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
-    """The bars of the ``states`` of a body.
-
-    Parameters
-    ----------
-    states
-        The rest state first.
-    finer
-            The states of the more accurate solution, perhaps fewer.
-    shared
-            The number (n,) of each point of the body in it, -1 for a point that it lacks.
-    sharper
-            Its differences in numerics, in words.
-
+    """The bars of the ``states`` of a body, the rest state first, from the ``finer`` states of a more accurate solution, which may
+    be fewer. ``shared`` (n,): the number of each point of the body in that solution, -1 for a point that it lacks; ``sharper``:
+    its differences in numerics, in words.
     """
     there = {state.number: state for state in finer}
     pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]

@@ -39,7 +39,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """The cover of ``claims``; NaN without any."""
+        """The cover of ``claims``; NaN where there are none."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)
@@ -49,7 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims, by case the ``sizes`` [mm] of tetrahedra (the reference's, the finer ones), and by case the reason of
+    """All claims; by case the ``sizes`` [mm] of tetrahedra (the reference's, the finer ones); ``missing``: by case, the reason of
     omission.
     """
 
@@ -61,19 +61,8 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of error bars, each with the difference from a finer solution.
-
-    Parameters
-    ----------
-    case
-        Its name.
-    of
-            ``"change"`` or ``"deviation"``: the measured quantity.
-    bars
-            Those of the reference.
-    reference, finer
-        The measures of the two solutions.
-
+    """The claims of the error ``bars`` of a reference: each bar of a ``"change"`` or ``"deviation"``, with the difference of the
+    reference's measures from those of the ``finer`` solution.
     """
     found = []
     for metric, statistic in CLAIMED:
@@ -82,9 +71,8 @@ def claimed(
         assert bar is not None  # every statistic of every metric has a bar
         assert one is not None
         assert other is not None
-        errors = np.abs(one.values - other.values)
         found += [
             Claim(case, of, metric, statistic, number, float(value), float(error))
-            for number, value, error in zip(bars.numbers, bar.values, errors, strict=True)
+            for number, value, error in zip(bars.numbers, bar.values, np.abs(one.values - other.values), strict=True)
         ]
     return found

@@ -1,14 +1,17 @@
 """A reference and its candidates, measured and judged, as input of reports."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
-from fem_reference.assessment.doubts import doubts
+import numpy as np
+
 from fem_reference.assessment.error_bars import ErrorBars, Of
-from fem_reference.assessment.judge import Verdict, Word, doubted, overall, resolved, verdict
+from fem_reference.assessment.judge import Verdict, Word, doubted, doubts, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
+from fem_reference.foundations.mesh import Ints
 from fem_reference.foundations.records import join
 from fem_reference.metrics import (
     Context,
@@ -23,7 +26,7 @@ from fem_reference.metrics import (
 )
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case, Expectation
 
 
@@ -127,13 +130,13 @@ def compare(
     Parameters
     ----------
     case, setup
-            The case, and the set-up of its problem.
+        The case, and the set-up of its problem.
     reference
-            The run that serves as the truth.
+        The run that serves as the truth.
     candidates
-            Runs with all frames of the case, NaN where one was not reached. Only the parts that a run carries are judged.
+        Runs with all frames of the case, NaN where one was not reached. Only the parts that a run carries are judged.
     error_bars
-            Those of the reference: where they are too wide, nothing is judged. None without any.
+        Those of the reference, where known: where they are too wide, nothing is judged.
 
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
@@ -198,3 +201,45 @@ def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | No
         return measures
     known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]
     return tuple(one if bar is None else replace(one, error_bars=bar.values) for one, bar in known)
+
+
+def reached_frames(run: Run) -> Ints:
+    """Indices of the frames in which every coordinate of a run is a number."""
+    return np.flatnonzero(np.isfinite(run.positions).all(axis=(1, 2)))
+
+
+def reached(comparison: Comparison) -> Comparison:
+    """The comparison without the frames that a failed reference did not reach; unchanged where it reached all, or none."""
+    kept = reached_frames(comparison.reference)
+    if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
+        return comparison
+    numbers, measures = tuple(comparison.reference.numbers[i] for i in kept), partial(_kept, kept)
+    error, bars = comparison.extension_error, comparison.error_bars
+    if bars is not None:
+        shorter = tuple(
+            replace(bar, values=bar.values[kept], model=None if bar.model is None else bar.model[kept])
+            for bar in bars.bars
+        )
+        bars = replace(bars, numbers=numbers, bars=shorter)
+    return replace(
+        comparison,
+        reference=complete(comparison.reference, numbers),
+        candidates=tuple(complete(run, numbers) for run in comparison.candidates),
+        deviations={name: measures(found) for name, found in comparison.deviations.items()},
+        changes={name: measures(found) for name, found in comparison.changes.items()},
+        extension_error=None if error is None else measures((error,))[0],
+        error_bars=bars,
+    )
+
+
+def _kept(kept: Ints, measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
+    return tuple(
+        replace(
+            one,
+            values=one.values[kept],
+            where=tuple(one.where[i] for i in kept) if one.where else (),
+            numbers=tuple(one.numbers[i] for i in kept) if one.numbers else (),
+            error_bars=None if one.error_bars is None else one.error_bars[kept],
+        )
+        for one in measures
+    )

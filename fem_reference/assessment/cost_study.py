@@ -1,15 +1,17 @@
 """Studies of the cost of accuracy on cases: points of error and cost, as pages show and files store them."""
 
+import math
+import operator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
-
-from pydantic import TypeAdapter, ValidationError
 
 from fem_reference import metrics
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.fronts import TETRAHEDRA, Amount, Point
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
 from fem_reference.io import texts
 
 FORMAT = 1
@@ -39,31 +41,27 @@ class CaseStudy:
 
     @property
     def counted(self) -> tuple[Point, ...]:
-        """The points with their errors bounded below by the truth's bar, as nothing is known below it; also for the truth
-        itself.
-        """
-        names = {name for point in self.points for name in point.errors}
-        own = {name: bar for name, bar in self.bars.items() if name in names}
-        return tuple(
-            replace(point, errors=own if point.is_truth else self._at_least_bars(point.errors)) for point in self.points
-        )
+        """The points with their errors bounded below by the truth's bar, as nothing is known below it."""
+        return self._with_errors(max)
 
     @property
     def certain(self) -> tuple[Point, ...]:
         """The points with upper bounds of their errors, for any truth within its bar, which is added to each; for the truth
         itself its bar.
         """
-        found = zip(self.points, self.counted, strict=True)
-        return tuple(
-            counted if point.is_truth else replace(point, errors=self._with_bars(point.errors))
-            for point, counted in found
+        return self._with_errors(operator.add)
+
+    def _with_errors(self, of: Callable[[float, float], float]) -> tuple[Point, ...]:
+        """The points with their errors as a function ``of`` error and bar; the truth's errors are its bars."""
+        names = {name for point in self.points for name in point.errors}
+        own = {name: bar for name, bar in self.bars.items() if name in names}
+        others = (
+            {name: of(value, self.bars.get(name, 0.0)) for name, value in point.errors.items()} for point in self.points
         )
-
-    def _with_bars(self, errors: dict[str, float]) -> dict[str, float]:
-        return {name: value + self.bars.get(name, 0.0) for name, value in errors.items()}
-
-    def _at_least_bars(self, errors: dict[str, float]) -> dict[str, float]:
-        return {name: max(value, self.bars.get(name, 0.0)) for name, value in errors.items()}
+        return tuple(
+            replace(point, errors=own if point.is_truth else errors)
+            for point, errors in zip(self.points, others, strict=True)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,15 +101,7 @@ def _read(table: Any, place: str) -> CaseStudy:
         raise InputError(place, repr(table), _WANT)
     if table.get("format") != FORMAT:
         raise InputError(f"{place}: format", table.get("format", "nothing"), str(FORMAT))
-    try:
-        study = TypeAdapter(CaseStudy).validate_python(table)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
-        got = f'"{first["input"]}"' if isinstance(first["input"], str) else repr(first["input"])
-        missing = first["type"].startswith("missing")
-        want = "this key" if missing else first["msg"].removeprefix("Input should be ")
-        raise InputError(f"{place}: {key.lstrip('.')}", "nothing" if missing else got, want) from error
+    study = parse(CaseStudy, table, place)
     _check(study, place)
     return study
 
@@ -126,9 +116,8 @@ def _check(study: CaseStudy, place: str) -> None:
     known = metrics.units()
     for name, unit in study.units.items():
         if unit != known.get(name, unit) or unit not in known.values():
-            raise InputError(
-                f"{place}: units.{name}", f'"{unit}"', known.get(name) or f"one of {', '.join({*known.values()})}"
-            )
+            want = known.get(name) or f"one of {', '.join({*known.values()})}"
+            raise InputError(f"{place}: units.{name}", f'"{unit}"', want)
     for i, point in enumerate(study.points):
         for name in point.errors:
             if name not in study.units:
@@ -144,8 +133,8 @@ def _check_scene(scene: Any, place: str) -> None:
         if key not in scene:
             raise InputError(f"{place}.{key}", "nothing", f"this key beside the other of {' and '.join(TETRAHEDRA)}")
         try:
-            good = float(str(scene[key]).removesuffix(" mm")) >= 0
+            size = float(str(scene[key]).removesuffix(" mm"))
         except ValueError:
-            good = False
-        if not good:
+            size = math.nan
+        if not size >= 0:
             raise InputError(f"{place}.{key}", f'"{scene[key]}"', 'a size such as "8 mm", or how often it is refined')

@@ -1,13 +1,13 @@
 """Error bars of every statistic, frame by frame, from further solutions of the reference with coarser numerics.
 
-Bars use the measures of runs, and there are two sorts. For a candidate's deviation from the reference: the deviation of the
-reference's runs from each other, as by the triangle inequality another reference changes a deviation by at most that. For the
-reference's own change from rest: the share of these deviations by which the changes of its runs differ.
+There are two sorts of bars. That of a candidate's deviation from the reference is the deviation of the reference's runs from each
+other: by the triangle inequality, another reference changes the deviation by at most that. That of the reference's own change from
+rest is the share of these deviations by which the changes of its runs differ.
 """
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -19,6 +19,7 @@ from fem_reference.assessment.differences import carried, typical, typical_chang
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
+from fem_reference.io.texts import finite
 from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
 from fem_reference.runs.store import Run
 
@@ -38,20 +39,18 @@ VARIATION = 2.0
 # other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
-# The measures of a run against another or (None) its rest.
-_Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
 # By sort of bar, the differences (f,) of each statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The distance of one statistic from the truth by the reference's own error: ``values`` (f,) in ``unit`` by frame, NaN where
-    unknown; ``of`` the reference's own change from rest, or of a candidate's deviation from the reference. ``parts``: by cause,
-    its greatest contribution over the frames.
+    """The error bar of one statistic: its distance from the truth by the reference's own error, ``values`` (f,) in ``unit``, NaN
+    where unknown. It is ``of`` the reference's own change from rest or of a candidate's deviation from the reference. ``parts``: by
+    cause, its greatest contribution over the frames.
 
-    ``model`` (f,), where attachments are springs: the change of the statistic by exact ones. That is another model and no error
-    of this one, so it is no part of ``values``.
+    ``model`` (f,): the change of the statistic by exact attachments, where attachments are springs. Exact ones are another model
+    and no error of this one, so ``values`` leave it out.
     """
 
     of: Of
@@ -70,8 +69,8 @@ class ErrorBar:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of ``sizes`` [mm], the reference's own first;
-    the general ``order`` of the error in them is assumed.
+    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], the reference's own first,
+    and the general ``order`` that is assumed of the error in them.
     """
 
     numbers: tuple[int, ...]
@@ -94,11 +93,10 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Runs of the reference over the same frames: ``fine``, the reference itself; ``coarse``, on larger tetrahedra; by name the
-    ``varied`` ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are
-    springs.
+    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, ``varied``
+    are by name as ``coarse`` with one cause of error halved, and ``exact`` has exact attachments in place of springs.
 
-    ``sizes`` [mm] are those of the tetrahedra; ``safety`` is the factor of bars over the expected error.
+    ``sizes`` [mm]: those of the tetrahedra; ``safety``: the factor of bars over the expected error.
     """
 
     fine: Run
@@ -117,8 +115,8 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of every statistic of every metric, of changes and of deviations: the contributions of the tetrahedra and of the
-    variations. A statistic of a run itself has none: it is known.
+    """The bars of every statistic of every metric, of changes and of deviations, from the tetrahedra and the variations. A metric
+    of a run itself has no bars: its statistics are exact.
     """
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(_surface)
@@ -128,9 +126,12 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """Differences of two runs: for changes of the reference with its interior fibres, for deviations as surfaces."""
-        changes = _of_changes(run, other, measured)
-        return {"change": changes, "deviation": _of_deviations(surface(run), surface(other), measured)}
+        """Differences of two runs: of changes from rest with the interior fibres of both, and of the deviation of the ``other``'s
+        surface if ``run`` is its reference instead of itself.
+        """
+        against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
+        changes = _less(measured(run, None), measured(other, None))
+        return {"change": changes, "deviation": _less(against_run, against_itself)}
 
     statistics = measured(surface(pair.fine), surface(pair.fine))
     moved = _rms_of_surface(statistics, [one.values for one in measured(surface(pair.fine), None)])
@@ -170,46 +171,22 @@ def _surface(run: Run) -> Run:
     return replace(run, fibres=None, fibre_positions=None)
 
 
-def _of_changes(run: Run, other: Run, measured: _Measured) -> list[Floats]:
-    """The change from rest of ``run`` less that of ``other``, by statistic (f,)."""
-    return [one.values - same.values for one, same in zip(measured(run, None), measured(other, None), strict=True)]
-
-
-def _of_deviations(run: Run, other: Run, measured: _Measured) -> list[Floats]:
-    """The deviation of ``other`` from ``run`` minus that from itself, by statistic (f,): the change of a deviation with another
-    reference.
-    """
-    return [one.values - same.values for one, same in zip(measured(other, run), measured(other, other), strict=True)]
+def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Floats]:
+    """The values (f,) of ``measures`` minus those of ``others``, by statistic."""
+    return [one.values - other.values for one, other in zip(measures, others, strict=True)]
 
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
-    """Store error bars with the run to which they belong.
-
-    Parameters
-    ----------
-    bars
-            The bars to store.
-    folder
-            Folder of the run.
-    of
-            Their validity, by name: they are not read again where any of it differs.
-
-    """
+    """Store the error ``bars`` in the ``folder`` of their run; :func:`load` reads them only for the same ``of``."""
     rows = [
-        {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
-        | {"values": [_null(value) for value in bar.values]}
-        | {"parts": {name: _null(value) for name, value in bar.parts.items()}}
-        | {"model": None if bar.model is None else [_null(value) for value in bar.model]}
+        vars(bar)
+        | {"values": [finite(value) for value in bar.values]}
+        | {"parts": {name: finite(part) for name, part in bar.parts.items()}}
+        | {"model": None if bar.model is None else [finite(value) for value in bar.model]}
         for bar in bars.bars
     ]
-    table = {
-        "format": FORMAT,
-        "of": of,
-        "numbers": bars.numbers,
-        "sizes_mm": bars.sizes,
-        "order": bars.order,
-        "bars": rows,
-    }
+    table = {"format": FORMAT, "of": of, "numbers": bars.numbers, "sizes_mm": bars.sizes, "order": bars.order}
+    table["bars"] = rows
     files.write_text(folder / FILE, json.dumps(table, indent=1, allow_nan=False))
 
 
@@ -247,7 +224,3 @@ def _numbers(values: object) -> list[float]:
     if not isinstance(values, Iterable):
         raise TypeError("no list of numbers")
     return [math.nan if value is None else float(value) for value in values]
-
-
-def _null(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

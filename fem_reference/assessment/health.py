@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fem_reference.assessment.stress import History
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
+from fem_reference.geometry.distance import outer_windings
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.geometry.windings import outer_windings
 from fem_reference.problems.setup import Bone
 
 
@@ -98,8 +98,7 @@ def from_first(run: Followed) -> Found:
 
 def from_reference(run: Followed) -> Found:
     """Greatest distance of a vertex from that of the reference, in per cent of the body's size; NaN without a reference."""
-    nowhere = np.full(run.positions.shape, np.nan)
-    return _off(run, nowhere if run.truth is None else run.truth)
+    return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
 def unrest(run: Followed) -> Found:
@@ -110,11 +109,9 @@ def unrest(run: Followed) -> Found:
 def stretch(run: Followed) -> Found:
     """The greatest stretch of an edge of the surface, over that at rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-
-    def lengths(points: Floats) -> Floats:
-        return np.asarray(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1))
-
-    ratios = np.array([lengths(points) for points in run.positions]) / lengths(run.surface.points)
+    states = np.concatenate([run.surface.points[None], run.positions])
+    rest, *lengths = np.linalg.norm(states[:, edges[:, 1]] - states[:, edges[:, 0]], axis=2)
+    ratios = np.array(lengths) / rest
     worst = np.argmax(np.where(np.isnan(ratios), np.inf, ratios), axis=1)
     frames = np.arange(len(ratios))
     return ratios[frames, worst], None, run.positions[frames[:, None], edges[worst]].mean(axis=1)
@@ -122,20 +119,17 @@ def stretch(run: Followed) -> Found:
 
 def penetration(run: Followed) -> Found:
     """Greatest depth of a free vertex inside a bone, in per cent of the body's size."""
-    free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
         for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
-            back = np.linalg.inv(bone.pose(number))
-            depths[i] = np.maximum(depths[i], -bone.shape.sample(apply(back, points)).distance)
-    return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
+            depths[i] = np.maximum(depths[i], -bone.distances(number, points))
+    return _deepest(run, depths)
 
 
 def passed(run: Followed) -> Found:
     """Greatest depth of a free vertex inside a bone on the straight path from the last frame, relative to the bone, in per cent
     of the body's size: a bone that crossed the body is outside of it before and after.
     """
-    free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
         seen = [
@@ -146,7 +140,12 @@ def passed(run: Followed) -> Found:
             for share in np.linspace(0, 1, _LOOKS):
                 depth = -bone.shape.sample(before + share * (after - before)).distance
                 depths[i + 1] = np.maximum(depths[i + 1], depth)
-    return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
+    return _deepest(run, depths)
+
+
+def _deepest(run: Followed, depths: Floats) -> Found:
+    """The greatest of the ``depths`` (f, n) [mm] of free vertices, in per cent of the body's size."""
+    return _worst(run, 100 * np.where(True if run.free is None else run.free, depths, 0.0) / run.size)
 
 
 def pierced(run: Followed) -> Found:
@@ -183,19 +182,20 @@ def _worst(run: Followed, each: Floats) -> Found:
     return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]
 
 
-QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
-    "volume": ("%", volume),
-    "inside_out": ("%", inside_out),
-    "from_rest": ("%", from_rest),
-    "from_first": ("%", from_first),
-    "from_reference": ("%", from_reference),
-    "unrest": ("%", unrest),
-    "stretch": ("", stretch),
-    "penetration": ("%", penetration),
-    "passed": ("%", passed),
-    "pierced": ("%", pierced),
-    "overshoot": ("%", overshoot),
-}
+_ALL = (
+    volume,
+    inside_out,
+    from_rest,
+    from_first,
+    from_reference,
+    unrest,
+    stretch,
+    penetration,
+    passed,
+    pierced,
+    overshoot,
+)
+QUANTITIES: dict[str, Callable[[Followed], Found]] = {quantity.__name__: quantity for quantity in _ALL}
 
 
 def unstable(run: Followed) -> str:
@@ -210,6 +210,5 @@ def unstable(run: Followed) -> str:
 
 def history(run: Followed, quantity: str) -> History:
     """A ``quantity`` of a run over its frames."""
-    unit, measure = QUANTITIES[quantity]
-    values, words, points = measure(run)
-    return History(quantity, unit, run.numbers, values, tuple(words or ()), points)
+    values, words, points = QUANTITIES[quantity](run)
+    return History(quantity, "" if quantity == "stretch" else "%", run.numbers, values, tuple(words or ()), points)

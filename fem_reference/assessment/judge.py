@@ -1,14 +1,18 @@
-"""The judge: measure, truth and tolerance give pass, fail or inconclusive; doubts about the reference make a pass doubtful."""
+"""Verdicts on measures by truth and tolerance, and the doubts about a reference that make a pass doubtful."""
 
 import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
+from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
@@ -22,12 +26,13 @@ _KINDS = {
     "s": ("a time", 1.0),
     "1": ("a number", 1.0),
 }
+_LOW = 0.1  # det F, below which a state is hardly valid
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on an expectation: the ``word``, and the decisive ``value`` in ``unit`` at ``frame``; ``error_bar`` of the
-    reference there, NaN where unknown and None without any.
+    """The verdict on an expectation: the ``word``, the decisive ``value`` in ``unit`` at ``frame``, and the ``error_bar`` of the
+    reference in that frame, NaN where it is unknown and None where there are no bars.
     """
 
     word: Word
@@ -41,8 +46,8 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass where ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail where for none, else
-    inconclusive (all four in one unit). A value that is no number fails; without a truth, a tolerance or a bar it is
+    """Pass where ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail where for none of them, else
+    inconclusive (all four in one unit). A value that is not a number fails; an unknown truth, tolerance or bar makes it
     inconclusive.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
@@ -63,19 +68,45 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """The combined verdict: fail, inconclusive, doubtful pass, pass: the first of these that occurs; not judged without any."""
+    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; not judged for none."""
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
 
 
+def doubts(reference: Run) -> list[str]:
+    """Reasons to doubt a reference, in words: it did not reach all frames, is unstable, is nearly inverted, left the range of its
+    laws, or lost energy.
+    """
+    said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
+    modes = reference.scalars.get("negative_modes")
+    unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
+    if unstable:
+        said.append(f"unstable equilibrium in {unstable} of {len(reference.numbers)} frames")
+    smallest = [np.nanmin(values) for name, values in reference.scalars.items() if name.startswith("min_det_F")]
+    if smallest and min(smallest) < _LOW:
+        said.append(f"det F falls to {float(min(smallest)):#.3g}")
+    outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
+    if outside.any():
+        where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
+        said.append(f"cells are outside the range that a law is meant for {where}: see Provenance")
+    gaps = np.nan_to_num(reference.scalars.get("energy_gap", np.zeros(0)))
+    if (np.abs(gaps) > ENERGY_GAP).any():
+        most = int(np.argmax(np.abs(gaps)))
+        said.append(
+            f"{100 * gaps[most]:.3g} % of the energy without work at frame {reference.numbers[most]}: the body jumped, or the load "
+            "steps are too large to tell (largest_step)"
+        )
+    return said
+
+
 def doubted(word: Word, doubts: Collection[str]) -> Word:
-    """A verdict that rests on a reference with possible ``doubts``: they make a pass doubtful."""
+    """The verdict ``word`` in view of ``doubts`` about its reference: a doubtful pass in place of a pass."""
     return "doubtful pass" if word == "pass" and doubts else word
 
 
 def check(case: Case) -> None:
-    """Raise InputError unless every expectation of the case has an existing measure and frame, in the measure's unit."""
+    """Raise InputError unless each expectation of the case names an existing measure and frame, in the unit of the measure."""
     numbers = case.numbers
     for i, entry in enumerate(case.expect):
         place, expectation = join(case.place, f"expect[{i}]"), resolved(entry)
@@ -100,7 +131,7 @@ def check(case: Case) -> None:
 
 
 def resolved(expectation: Expectation) -> Expectation:
-    """An ``expectation`` with its statistic: by default the only one of its metric."""
+    """The ``expectation`` with its statistic, by default the only one of its metric."""
     start = f"{expectation.metric}."
     names = [name.removeprefix(start) for name in units() if name.startswith(start)]
     if expectation.statistic is not None or len(names) != 1:
@@ -109,7 +140,7 @@ def resolved(expectation: Expectation) -> Expectation:
 
 
 def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on a checked ``expectation`` from the measures of its run, over frame ``numbers``."""
+    """The verdict on a checked ``expectation`` by the ``measures`` of its run over frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
     bars = found.error_bars
@@ -119,8 +150,7 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
     words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
     word = overall(words)
-    # The decisive frame: the first that fails, else the inconclusive one with the greatest bar, else the one farthest
-    # from the truth.
+    # The first frame that fails decides, else the inconclusive frame with the widest bar, else the frame farthest from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
     widest = max(
         range(len(values)), key=lambda k: (words[k] == "inconclusive", math.inf if math.isnan(known[k]) else known[k])
@@ -132,6 +162,6 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
 
 
 def in_unit(given: str | float, unit: str) -> float:
-    """A quantity in the ``unit`` of a measure, a bare number only where that has none; ValueError where the dimension differs."""
+    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError where the dimension differs."""
     kind, factor = _KINDS[unit]
     return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

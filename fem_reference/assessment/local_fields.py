@@ -3,11 +3,10 @@
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Polylines, Surface
-from fem_reference.foundations.motion import apply
+from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import DISTANCE_MARGIN, Bone
+from fem_reference.problems.setup import DISTANCE_MARGIN
 from fem_reference.runs.store import Run
 
 
@@ -19,41 +18,26 @@ def to_same_vertex(run: Run, reference: Run) -> Floats:
 
 def to_surface(run: Run, reference: Run) -> Floats:
     """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN where unknown."""
-    return np.stack(
-        [_to_surface(*frame, reference.surface) for frame in zip(run.positions, reference.positions, strict=True)]
-    )
-
-
-def _to_surface(points: Floats, others: Floats, rest: Surface) -> Floats:
-    known = np.isfinite(points).all() and np.isfinite(others).all()
-    return signed_distances(points, rest.moved_to(others)) if known else np.full(len(points), np.nan)
+    found = np.full(run.positions.shape[:2], np.nan)
+    for i, (points, others) in enumerate(zip(run.positions, reference.positions, strict=True)):
+        if np.isfinite(points).all() and np.isfinite(others).all():
+            found[i] = signed_distances(points, reference.surface.moved_to(others))
+    return found
 
 
 def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
     """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN for vertices
     that are exempt from contact or unknown. None where a bone is not closed: it has no inside.
     """
+    gaps = np.full(run.positions.shape[:2], DISTANCE_MARGIN)
     try:
-        frames = [_gaps(points, number, context) for number, points in zip(run.numbers, run.positions, strict=True)]
+        for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
+            for bone in context.bones if np.isfinite(points).all() else ():
+                gaps[i] = np.minimum(gaps[i], bone.distances(number, points))
     except InputError:
         return None
-    return np.stack(frames)
-
-
-def _gaps(points: Floats, number: int, context: MeasurementContext) -> Floats:
-    gaps = np.full(len(points), DISTANCE_MARGIN)
-    if not np.isfinite(points).all():
-        return np.full(len(points), np.nan)
-    for bone in context.bones:
-        gaps = np.minimum(gaps, to_bone(bone, number, points))
-    return np.where(context.exempt.vertices, np.nan, gaps)
-
-
-def to_bone(bone: Bone, number: int, points: Floats) -> Floats:
-    """Distance (n,) [mm] of ``points`` (n, 3) to a ``bone`` at a frame ``number``, negative inside; InputError where the bone is
-    not closed.
-    """
-    return np.asarray(bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance)
+    lost = ~np.isfinite(run.positions).all(axis=(1, 2))
+    return np.where(lost[:, None] | context.exempt.vertices, np.nan, gaps)
 
 
 def fibre_points(run: Run, context: MeasurementContext) -> Floats:

@@ -6,9 +6,8 @@ import numpy as np
 
 from fem_reference import metrics
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.metrics import Measure, MeasurementContext
+from fem_reference.metrics import Measure
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
@@ -16,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None without any."""
+    """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None where unknown."""
 
     scene: MuscleCase
     candidate: Run
@@ -29,11 +28,8 @@ class CurrentMeasures:
         cls, case: MuscleCase, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
     ) -> "CurrentMeasures":
         """Measure a candidate and its reference, which both have the frames of the case."""
-        if reference.fibres is None:
-            got, want = "a run without an interior", "a reference that carries the fibres"
-            raise InputError(f"{reference.name}: fibres", got, want)
-        context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
-        return cls(case, candidate, reference, metrics.measure(candidate, reference, context), error_bars)
+        measures = metrics.measure(candidate, reference, metrics.context_of(setup, reference))
+        return cls(case, candidate, reference, measures, error_bars)
 
     @property
     def points(self) -> Floats:
@@ -61,14 +57,15 @@ class CurrentMeasures:
         found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 
-    def values(self, metric: str, statistic: str) -> Floats:
-        """The values (f,) of a statistic, NaN where not finite or not measured for this candidate."""
-        found = (one.values for one in self.measures if (one.metric, one.statistic) == (metric, statistic))
-        values = next(found, np.full(len(self.reference.numbers), np.nan))
+    def values(self, name: str) -> Floats:
+        """The values (f,) of a ``metric.statistic``, NaN where not finite or not measured for this candidate."""
+        found = metrics.find(self.measures, *name.split("."))
+        values = np.full(len(self.reference.numbers), np.nan) if found is None else found.values
         return np.where(np.isfinite(values), values, np.nan)
 
-    def bars(self, metric: str, statistic: str) -> Floats:
-        """The error bars (f,) of a deviation, NaN where unknown; a statistic of the run itself is known exactly."""
+    def bars(self, name: str) -> Floats:
+        """The error bars (f,) of a deviation by ``metric.statistic``, NaN where unknown; a statistic of the run itself is exact."""
+        metric, statistic = name.split(".")
         if metrics.of_itself(metric):
             return np.zeros(len(self.reference.numbers))
         found = None if self.error_bars is None else self.error_bars.find("deviation", metric, statistic)

@@ -90,7 +90,8 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
     >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
     {'volume.deviation': 2.0, 'surface_deviation.rms': nan}
     """
-    return {name: _ratio(value, bars.get(name, math.nan)) for name, value in changes.items()}
+    known = {name: (value, bars.get(name, math.nan)) for name, value in changes.items()}
+    return {name: value / bar if bar else math.inf if value else 0.0 for name, (value, bar) in known.items()}
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
@@ -107,10 +108,6 @@ def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
     if not ratios or any(map(math.isnan, ratios)):
         return "not known"
     return "does not matter" if all(ratio < NEGLIGIBLE for ratio in ratios) else "hardly"
-
-
-def _ratio(value: float, bar: float) -> float:
-    return value / bar if bar else math.inf if value else 0.0
 
 
 def facts(found: CaseOmissions) -> dict[str, Any]:

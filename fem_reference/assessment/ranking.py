@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fem_reference.io.texts import finite
 from fem_reference.metrics import Measure, described, find
 
 
@@ -81,14 +82,12 @@ def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) 
     """
     known, found = tuple(bars), []
     for key, stated in described("rank").items():
-        bar = find(known, *key)
-        measures = {name: find(all_of, *key) for name, all_of in measured.items()}
-        if bar is None:
+        if (bar := find(known, *key)) is None:
             continue
         places = ranked(
             Deviation(name, abs(one.worst.value), float(bar.values[one.worst.index]))
-            for name, one in measures.items()
-            if one is not None
+            for name, measures in measured.items()
+            if (one := find(measures, *key)) is not None
         )
         if len(places) > 1:
             found.append(Ranking(stated.label, bar.unit, places))
@@ -102,15 +101,11 @@ def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
             "by": one.title,
             "unit": one.unit,
             "name": place.deviation.name,
-            "value": _finite(place.deviation.value),
-            "error_bar": _finite(place.deviation.bar),
+            "value": finite(place.deviation.value),
+            "error_bar": finite(place.deviation.bar),
             "rank": [place.first, place.last],
             "not_distinguishable_from": list(place.alike),
         }
         for one in found
         for place in one.places
     ]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -10,7 +10,7 @@ import numpy as np
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import TETRAHEDRA, Point
-from fem_reference.assessment.settings import is_elsewhere, setting, tetrahedra
+from fem_reference.assessment.transfer import is_elsewhere, setting, tetrahedra
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"

@@ -9,8 +9,7 @@ import numpy as np
 
 from fem_reference.assessment import judge
 from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, StoredStatistic
-from fem_reference.assessment.doubts import doubts
-from fem_reference.assessment.judge import Word
+from fem_reference.assessment.judge import Word, doubts
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.version import __version__
@@ -60,9 +59,9 @@ class Judgement:
             return "there is a number now, and there was none"
         if self.word == "inconclusive":
             return self._why_silent
-        much = f"{self.away:.4g} {self.unit}"
-        text = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
-        return f"{text}, {self.allowed:.4g} {self.unit} allowed{self._direction}"
+        start = "what it was" if self.question == "unchanged" else "the reference"
+        much, most = (f"{value:.4g} {self.unit}" for value in (self.away, self.allowed))
+        return f"{much} from {start}, {most} allowed{self._direction}"
 
     @property
     def _direction(self) -> str:
@@ -111,16 +110,10 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
     """Judge ``current`` by a baseline of the same case, scene and candidate."""
     found = [_moved(baseline.positions, current)]
     for name, stored in baseline.measures.items():
-        now = current.values(*name.split("."))
-        found += [_unchanged(name, stored, now, current), _within(name, stored, now, current)]
+        found += _of_statistic(name, stored, current)
+    # A worse result comes before a merely different one.
     found.sort(
-        key=lambda one: (
-            WORST_FIRST.index(one.word),
-            one.question != "within",  # a worse result comes before a merely different one
-            one.name != MOVED,
-            -one.used,
-            one.name,
-        )
+        key=lambda one: (WORST_FIRST.index(one.word), one.question != "within", one.name != MOVED, -one.used, one.name)
     )
     notes = tuple(_notes(baseline, current, found))
     return Check(current.scene.name, current.candidate.name, tuple(found), notes, tuple(doubts(current.reference)))
@@ -145,24 +138,22 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, current)
 
 
-def _unchanged(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Judge whether a statistic is unchanged; the baseline is exact but for rounding."""
-    was = stored.numbers
-    known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
-    return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, current)
-
-
-def _within(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Judge whether a statistic is within its allowed distance from the reference, which is known up to its error bar."""
-    was, within = stored.numbers, math.nan if stored.within is None else stored.within
-    frames = _Frames(was, now, np.zeros(len(was)), current.bars(*name.split(".")))
-    return _judged("within", (name, stored.unit), frames, within, current)
+def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) -> Iterator[Judgement]:
+    """Judge whether a statistic is unchanged (the baseline is exact but for rounding), and whether it is within its allowed
+    distance from the reference, which is known up to its error bar.
+    """
+    was, now, within = stored.numbers, current.values(name), math.nan if stored.within is None else stored.within
+    rounding = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
+    unchanged = _Frames(was, now, was, rounding)
+    yield _judged("unchanged", (name, stored.unit), unchanged, stored.tolerance, current)
+    from_reference = _Frames(was, now, np.zeros(len(was)), current.bars(name))
+    yield _judged("within", (name, stored.unit), from_reference, within, current)
 
 
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """The judgement by the decisive frame: of those with the decisive word, the one farthest off, or with the greatest bar."""
+    """The judgement by the decisive frame: of those with the decisive word, the farthest from its target or of the widest bar."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)

@@ -12,12 +12,11 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
-from fem_reference.geometry.penetrations import ClosedSurface, Depths, depths
+from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
@@ -96,9 +95,8 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 rest, along = body.mesh.points[nodes], list(entry.components)
                 wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
-                allowed = SAME * (
-                    body.size + float(np.abs(wanted).max())
-                )  # up to which regions may contradict each other where they meet
+                # Up to this, regions may contradict each other where they meet.
+                allowed = SAME * (body.size + float(np.abs(wanted).max()))
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
@@ -160,9 +158,8 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
             off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * facets_away
-            yield _at(
-                f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
-            )
+            places = run.positions[i][entry.vertices]
+            yield _at(f"{entry.attachment} off {entry.bone.name}", off, allowed, number, places)
         elif forces is not None and skin is not None:
             mean = float(np.linalg.norm(weights @ away) / weights.sum())
             yielded = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
@@ -198,18 +195,15 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external effects."""
-    outer = any(one.outer or _is_foreign(one) for one in problem.effects)
+    # The origin of force of a user's own effect is unknown.
+    foreign = [one for one in problem.effects if not type(one).__module__.startswith("fem_reference.effects.")]
+    outer = foreign or any(one.outer for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
     for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
         if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
             for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
                 yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
-
-
-def _is_foreign(effect: Effect) -> bool:
-    """True for a user's own effect, whose origin of force is unknown."""
-    return not type(effect).__module__.startswith("fem_reference.effects.")
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
@@ -226,25 +220,22 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
     allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    contact, rest = problem.contact, ClosedSurface(run.surface)
+    contact, rest = problem.contact, run.surface
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
-    inside = cache(lambda: ClosedSurface(skin()))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
-        muscle = ClosedSurface(run.surface.moved_to(run.positions[i]))
+        muscle = run.surface.moved_to(run.positions[i])
         for bone in bones:
             check_of = partial(
                 _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
             )
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
-                check = min(check, check_of(ClosedSurface(skin().moved_to(now)), inside()), key=lambda one: one.share)
+                check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
             yield check
 
 
-def _deep(
-    bone: Bone, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
-) -> RunCheck:
+def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
     """Penetration of a bone and the muscle; minus that at rest, where this exceeds the give of contact. Never up to the middle of
     a bone.
     """
@@ -252,13 +243,13 @@ def _deep(
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
         deepest, place = found.deepest(_at_rest(rest, bone))
-        give += _behind(muscle.surface, place) / half if pressed else 0.0
+        give += _behind(muscle, place) / half if pressed else 0.0
     allowed = min(give, _GIVEN_WAY * half)
     return _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
 
 
 @lru_cache(maxsize=8)
-def _at_rest(muscle: ClosedSurface, bone: Bone) -> Depths:
+def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 

@@ -2,21 +2,20 @@
 
 import hashlib
 import logging
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from fem_reference.assessment import run_checks
 from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
+from fem_reference.io.texts import finite
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import amend
-from fem_reference.runs.cut_off import places
 from fem_reference.runs.store import Frame, Outcome, Run, collected
+from fem_reference.runs.writer import places
 
 log = logging.getLogger(__name__)
 
@@ -34,13 +33,15 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
     """A converged ``run`` with its second check in the origin, stored with it; unchanged where it has the check of this code."""
-    stored, code = run.origin.get(RECORD, {}), _code()
+    stored, code = run.origin.get(RECORD, {}), hashlib.sha256(Path(run_checks.__file__).read_bytes()).hexdigest()[:16]
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
     checks = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
     outcome = confirmed(replace(run.outcome, status="converged", message=message), checks)
-    facts = [{name: _known(value) for name, value in asdict(one).items()} | {"met": one.met} for one in checks]
+    facts = [
+        asdict(one) | {"value": finite(one.value), "allowed": finite(one.allowed), "met": one.met} for one in checks
+    ]
     seconds = time.process_time() - begin
     origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "checks": facts}}
     if run.folder is not None:
@@ -58,20 +59,11 @@ def confirmed_frames(problem: MuscleProblem, frames: Sequence[Frame], outcome: O
     return confirmed(outcome, of_muscle(problem, run, tets.get))
 
 
-def _code() -> str:
-    """A hash of the checks."""
-    return hashlib.sha256(Path(run_checks.__file__).read_bytes()).hexdigest()[:16]
-
-
 def texts_of(run: Run) -> tuple[str, ...]:
     """The checks stored with a ``run``, in words, those that deny it first; empty for an unchecked one."""
     found = run.origin.get(RECORD, {}).get("checks", [])
     texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
-
-
-def _known(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def confirmed_body(body: Body, solved: Run) -> Run:

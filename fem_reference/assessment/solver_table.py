@@ -127,11 +127,8 @@ class Table:
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
         """The worst frames of ``name`` over all scenarios; None where it was not measured."""
-        found = [
-            (value[0], one.case)
-            for one in self.results
-            if (one.kind, one.name) == (kind, name) and (value := one.worst(metric, statistic)) is not None
-        ]
+        mine = [one for one in self.results if (one.kind, one.name) == (kind, name)]
+        found = [(value[0], one.case) for one in mine if (value := one.worst(metric, statistic)) is not None]
         finite = [(value, case) for value, case in found if not np.isnan(value)]
         lost = tuple(case for value, case in found if np.isnan(value))
         if not finite:

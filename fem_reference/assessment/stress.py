@@ -10,6 +10,7 @@ from pydantic import Field
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
+from fem_reference.io.texts import finite
 
 Verdict = Literal["ok", "degraded", "failed", "refused", "inconclusive"]
 VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconclusive")
@@ -103,6 +104,7 @@ class Stress:
 
 
 _OTHER_REASONS = ("timed out", "crashed", "denied")  # endings of a run that do not mean that there is no solution
+_PICTURED = ("history", "at", "scene")  # fields of a cell for its picture
 Weighed = Sequence[tuple[Bound, History]]
 
 
@@ -168,25 +170,14 @@ def _decisive(cell: Cell, weighed: Weighed) -> Cell:
     )
 
 
-def _row(case: HardCase) -> dict[str, Any]:
-    bounds = [bound.model_dump() for bound in case.bounds]
-    return {"name": case.name, "title": case.title, "healthy": case.healthy, "bounds": bounds}
-
-
 def facts(stress: Stress) -> dict[str, Any]:
     """The contents of pages, except pictures, as valid JSON."""
-    cells = []
-    for cell in stress.cells:
-        plain = {
-            name: getattr(cell, name) for name in cell.__dataclass_fields__ if name not in ("history", "at", "scene")
-        }
-        for name in ("value", "bound"):
-            if plain[name] is not None and not np.isfinite(plain[name]):
-                plain[name] = None
-        cells.append(plain)
+    cells = [{name: value for name, value in vars(cell).items() if name not in _PICTURED} for cell in stress.cells]
+    for cell in cells:
+        cell |= {name: None if cell[name] is None else finite(cell[name]) for name in ("value", "bound")}
     return {
         "format": 1,
-        "cases": [_row(case) for case in stress.cases],
+        "cases": [vars(case) | {"bounds": [bound.model_dump() for bound in case.bounds]} for case in stress.cases],
         "solvers": list(stress.solvers),
         "cells": cells,
         "seconds": stress.seconds,

@@ -50,12 +50,12 @@ class Change:
 
     @property
     def by(self) -> float:
-        """The change there, positive where it is farther away; NaN without a number before and now."""
+        """The change in that frame, positive where it is farther away; NaN without a number before and now."""
         return float(self.further[self.at])
 
     @property
     def bar(self) -> float:
-        """The error bar of the reference there."""
+        """The error bar of the reference in that frame."""
         return float(self.bars[self.at])
 
     @property
@@ -66,7 +66,7 @@ class Change:
 
     @property
     def in_bars(self) -> float:
-        """The change there in error bars, NaN where these are unknown."""
+        """The change in that frame in error bars, NaN where these are unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
@@ -144,7 +144,7 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
             "--against", f"{before.points.shape[1]} vertices", f"{current.points.shape[1]}, those of the candidate"
         )
     names = {name: one.unit for name, one in before.by_name.items() if name in current.by_name}
-    known = {name: before.values(*name.split(".")) for name in names}
+    known = {name: before.values(name) for name in names}
     with np.errstate(invalid="ignore", over="ignore"):
         moved = np.linalg.norm(current.points - before.points, axis=2)
     differences = tuple(_differences(before.candidate.origin, current.candidate.origin))
@@ -164,8 +164,7 @@ def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versi
 def _changes(current: CurrentMeasures, units: dict[str, str], was: dict[str, Floats]) -> tuple[Change, ...]:
     numbers = current.candidate.numbers
     found = [
-        Change(name, unit, numbers, was[name], current.values(*name.split(".")), current.bars(*name.split(".")))
-        for name, unit in units.items()
+        Change(name, unit, numbers, was[name], current.values(name), current.bars(name)) for name, unit in units.items()
     ]
     return tuple(sorted(found, key=lambda one: (ORDER.index(one.word), -np.nan_to_num(one.size), one.name)))
 

@@ -1,6 +1,8 @@
 """The command line: the only place that prints, shows progress and exits."""
 
 import argparse
+import builtins
+import json
 import logging
 import os
 import re
@@ -8,36 +10,15 @@ import signal
 import sys
 import traceback
 from pathlib import Path
+from typing import Any
 
-from fem_reference.cli._parser import names, parser, verb
-from fem_reference.cli._printing import (
-    BAD_INPUT,
-    BROKEN,
-    DONE,
-    INTERRUPTED,
-    SOLVER_FAILED,
-    TERMINATED,
-    VERDICT_FAIL,
-    out,
-)
+from fem_reference.cli._parser import parser
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
-__all__ = [
-    "BAD_INPUT",
-    "BROKEN",
-    "DONE",
-    "INTERRUPTED",
-    "SOLVER_FAILED",
-    "TERMINATED",
-    "VERDICT_FAIL",
-    "entry",
-    "main",
-    "names",
-    "parser",
-    "verb",
-]
-
-
+DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
+# Our own mistake, EX_SOFTWARE of sysexits.h. Python's own status for it is 1, which here is a verdict.
+BROKEN = 70
+INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
 
 
@@ -56,17 +37,12 @@ def main(arguments: list[str]) -> int:
         _check_outputs(options)
         _check_name(options.page_name)
         status: int = options.verb(options)
-    except (InputError, OSError) as error:
+    except (InputError, OSError, MissingSoftware) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except MissingSoftware as error:
-        print(f"fem-reference: {error}", file=sys.stderr)
-        return SOLVER_FAILED
+        return SOLVER_FAILED if isinstance(error, MissingSoftware) else BAD_INPUT
     except KeyboardInterrupt:
-        print(
-            "fem-reference: interrupted; what is stored stays, and a run of the reference goes on next time",
-            file=sys.stderr,
-        )
+        said = "interrupted; what is stored stays, and a run of the reference goes on next time"
+        print(f"fem-reference: {said}", file=sys.stderr)
         return INTERRUPTED
     except SystemExit:
         raise
@@ -137,3 +113,37 @@ def _show_progress(*, on: bool) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(message)s"))
     log.handlers[:] = [handler]
+
+
+def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
+    """Nested facts as indented lines."""
+    printed = []
+    for key, value in facts.items():
+        if isinstance(value, dict):
+            printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
+        elif isinstance(value, builtins.list):  # list is a module here, once imported
+            printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
+        else:
+            printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
+    return printed
+
+
+def out(options: argparse.Namespace) -> Path:
+    """The folder of pages and stored runs."""
+    return options.out if options.out is not None else Path("reports")
+
+
+def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
+    """Print ``text``, and write ``facts`` as JSON where that is wanted."""
+    print(text)
+    if options.json is not None:
+        write(options.json, json.dumps(facts, indent=1, allow_nan=False))
+
+
+def write(path: Path | None, text: str) -> None:
+    """Write a file that is wanted, below a folder that may be new."""
+    if path is not None:
+        from fem_reference.io import files
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write_text(path, text)

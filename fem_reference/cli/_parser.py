@@ -7,7 +7,8 @@ import argparse
 import ast
 import importlib
 from pathlib import Path
-from typing import Any, Protocol, cast
+from types import ModuleType
+from typing import Any
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.version import __version__
@@ -65,56 +66,40 @@ def share(parser: argparse.ArgumentParser, *names: str) -> None:
         parser.add_argument(name, **_SHARED[name])
 
 
-class Verb(Protocol):
-    """The contents of the module of a verb."""
-
-    HELP: str
-
-    def add_options(self, parser: argparse.ArgumentParser, /) -> None:
-        """Add the options that the verb has beside ``--out``, ``--json`` and ``--quiet``."""
-
-    def run(self, options: argparse.Namespace, /) -> int:
-        """Do it; returns the exit status."""
-
-
 def names() -> list[str]:
     """The names of all verbs."""
     return sorted(path.stem for path in _FOLDER.glob("*.py") if not path.stem.startswith("_"))
 
 
-def verb(name: str) -> Verb:
-    """The verb of a name."""
-    return cast(Verb, importlib.import_module(f"{__package__}.{name}"))
+def verb(name: str) -> ModuleType:
+    """The module of a verb."""
+    return importlib.import_module(f"{__package__}.{name}")
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line; ``verb`` of its options is what carries it out. With ``only`` the name of a verb, that
-    alone is imported and has its options: all of them take seconds to load.
-    """
+    """The parser of the whole command line; with ``only`` a verb, that alone is imported: all of them take seconds to load."""
     whole = argparse.ArgumentParser(
         prog="fem-reference", description="Finite element reference and validation for muscle deformation."
     )
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        text = _help(name)
+        # What a verb is for is read from its file: to import it takes long.
+        assigned = [
+            node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)
+        ]
+        (text,) = (ast.literal_eval(one.value) for one in assigned if ast.unparse(one.targets[0]) == "HELP")
         sub = kinds.add_parser(name, help=text, description=text)
         if only in (None, name):
             _add(verb(name), sub)
     return whole
 
 
-def _help(name: str) -> str:
-    """The line that describes a verb, read from its file."""
-    assigned = [node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)]
-    texts = [ast.literal_eval(node.value) for node in assigned if ast.unparse(node.targets[0]) == "HELP"]
-    return str(*texts)
-
-
-def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
-    """The options of a verb."""
+def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
+    """The options of a verb, and those that all have."""
     sub.register("action", None, _Given)
-    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True, page_name=None)
+    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False)
+    sub.set_defaults(limit=[], writes=True, page_name=None)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
     sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
@@ -122,9 +107,7 @@ def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
 
 
 class _Given(argparse.Action):
-    """The value of an option, given once: a second one would silently take the place of the first. An option whose default is a
-    list may be repeated, and has each value once.
-    """
+    """The value of an option, given once: a second one would silently replace it. A list has each of its values once."""
 
     def __call__(
         self,

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.measured import CurrentMeasures
-from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, write, write_output
+from fem_reference.cli._cases import checked_bench, choose, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
-from fem_reference.io import files
 from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import refinement
@@ -41,7 +40,6 @@ def run(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     scene = casefile.muscle(scene_of(options), "CASE")
     entry, place = choose(scene, options.candidate, options.unit)
-    check_names([entry.name])
     bench = checked_bench(scene, options, [(entry, place)])
     # What is wrong with the baseline shows before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
@@ -52,27 +50,16 @@ def run(options: argparse.Namespace) -> int:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
         facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
         lost = regression_texts.lost(scene.name, candidate.name, why)
-        _write({options.junit: lost.junit, options.markdown: lost.markdown})
+        write(options.junit, lost.junit)
+        write(options.markdown, lost.markdown)
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.offered(bench, reference, asked=options.error_bar)
-    return _printed(CurrentMeasures.of(scene, bench.setup(), candidate, reference, bars), options, begin)
-
-
-def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float) -> int:
-    """Judge, write what is wanted, and return the exit status."""
+    current = CurrentMeasures.of(scene, bench.setup(), candidate, reference, bars)
     if options.update:
         baseline.update(options.baseline, current)
-    result = regression.check(baseline.read(options.baseline, current.scene, current.candidate.name), current)
-    junit = regression_texts.junit(result, time.perf_counter() - begin)
-    _write({options.junit: junit, options.markdown: regression_texts.markdown(result)})
+    result = regression.check(baseline.read(options.baseline, scene, candidate.name), current)
+    write(options.junit, regression_texts.junit(result, time.perf_counter() - begin))
+    write(options.markdown, regression_texts.markdown(result))
     write_output(regression_texts.facts(result), regression_texts.text(result), options)
     return VERDICT_FAIL if result.word == "fail" else DONE
-
-
-def _write(texts: dict[Path | None, str]) -> None:
-    """Write each text that is wanted."""
-    for path, text in texts.items():
-        if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            files.write_text(path, text)

@@ -6,15 +6,13 @@ from pathlib import Path
 from fem_reference import solvers
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
-from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of, with_limits
-from fem_reference.cli._pages import candidates, case_part, changes, judge, publish
+from fem_reference.cli import DONE, SOLVER_FAILED, write_output
+from fem_reference.cli._cases import asked, candidates, checked_bench, choose, compared, publish, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
-from fem_reference.report.asked import Asked, Part
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.report.asked import Part
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import recorded
@@ -42,14 +40,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure candidates against the reference."""
-    scene = with_limits(scene_of(options), options.limit)
+    scene = scene_of(options)
     known = solvers.names(scene.task)
     for name in options.solver:
         if name not in known:
             raise InputError("--solver", f'"{name}"', f"one of {', '.join(known)}")
     wanted = [*(options.candidate or []), *options.solver] or [candidate.name for candidate in scene.candidate]
     chosen = [choose(scene, text, options.unit) for text in wanted]
-    return judge(scene, options, chosen) if options.against is None else _against(scene, options, chosen)
+    return compared(scene, options, chosen) if options.against is None else _against(scene, options, chosen)
 
 
 def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
@@ -60,7 +58,6 @@ def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
     if options.limit:
         raise InputError("--limit", "with --against", "one of the two: check judges a candidate by its past")
     ((entry, place),) = chosen
-    check_names([entry.name])
     bench, path = checked_bench(scene, options, chosen), options.against
     if path.is_file() and path.suffix == ".json":
         before: Run | baseline.Baseline = baseline.read(path, scene, entry.name)
@@ -80,16 +77,9 @@ def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
         found = versions.of_runs(measured(now), measured(before), str(path))
     else:
         found = versions.of_baseline(measured(now), before, str(path))
-    asked = _asked(bench.scene, options, entry)
-    publish(
-        options, asked, against_page.page(found, bench.setup()), against_page.facts(found), against_page.text(found)
-    )
-    return DONE if now.outcome.status == "converged" else SOLVER_FAILED
-
-
-def _asked(case: Case, options: argparse.Namespace, entry: Candidate) -> Asked:
-    """The page of what changed, whose name states against what."""
-    path: Path = options.against
     part = Part(("--against", str(path.resolve())), f"against_{path.stem if path.is_file() else path.resolve().name}")
-    who = candidates(case, [entry]) or (Part(("--candidate", entry.name), entry.name),)
-    return Asked("compare", case.name, (case_part(case), *changes(options), *who, part), "against")
+    who = candidates(scene, [entry]) or (Part(("--candidate", entry.name), entry.name),)
+    page = against_page.page(found, bench.setup())
+    wanted = asked("compare", scene, options, "against", *who, part)
+    publish(options, wanted, page, against_page.facts(found), against_page.text(found))
+    return DONE if now.outcome.status == "converged" else SOLVER_FAILED

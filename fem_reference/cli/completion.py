@@ -5,8 +5,7 @@ import argparse
 import shtab
 
 from fem_reference import solvers
-from fem_reference.cli import _parser
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, _parser, write_output
 from fem_reference.scenes import casefile
 
 HELP = "print what lets a shell complete verbs, options and names of cases"
@@ -38,19 +37,13 @@ def script(shell: str) -> str:
     """The script for a ``shell``: names of cases and solvers where they may stand, files and folders where paths may."""
     whole = _parser.parser()
     (kinds,) = (one for one in whole._actions if isinstance(one, argparse._SubParsersAction))
-    for verb in kinds.choices.values():
-        for action in verb._actions:
-            _offer(action)
+    for action in (action for verb in kinds.choices.values() for action in verb._actions):
+        if action.choices is None and action.dest in ("case", "cases"):
+            action.choices = casefile.cases()
+        elif action.choices is None and action.metavar == "NAME" and action.dest == "solver":
+            action.choices = solvers.names()
+        elif str(action.metavar).endswith("FILE"):
+            setattr(action, _COMPLETE, shtab.FILE)
+        elif str(action.metavar).endswith("DIR"):
+            setattr(action, _COMPLETE, shtab.DIRECTORY)
     return f"{shtab.complete(whole, shell)}\n{_ALIASES[shell]}"
-
-
-def _offer(action: argparse.Action) -> None:
-    """Give an ``action`` what completes it where argparse does not know that."""
-    if action.choices is None and action.dest in ("case", "cases"):
-        action.choices = casefile.cases()
-    elif action.choices is None and action.metavar == "NAME" and action.dest == "solver":
-        action.choices = solvers.names()
-    elif str(action.metavar).endswith("FILE"):
-        setattr(action, _COMPLETE, shtab.FILE)
-    elif str(action.metavar).endswith("DIR"):
-        setattr(action, _COMPLETE, shtab.DIRECTORY)

@@ -2,8 +2,7 @@
 
 import argparse
 
-from fem_reference.cli._choosing import own_candidates
-from fem_reference.cli._pages import judge
+from fem_reference.cli._cases import compared, own_candidates
 from fem_reference.cli._parser import share
 from fem_reference.scenes import casefile
 
@@ -19,4 +18,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve the main job and all its candidates."""
     scene = casefile.read(MAIN_JOB)
-    return judge(scene, options, own_candidates(scene))
+    return compared(scene, options, own_candidates(scene))

@@ -3,11 +3,10 @@
 import argparse
 
 from fem_reference.assessment.omissions import facts
-from fem_reference.cli._pages import case_part, changes, publish
+from fem_reference.cli import DONE, SOLVER_FAILED, out
+from fem_reference.cli._cases import asked, publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out
 from fem_reference.report import effects_page
-from fem_reference.report.asked import Asked
 from fem_reference.scenes import casefile
 from fem_reference.studies import omissions
 from fem_reference.studies.campaign import Workers
@@ -25,6 +24,6 @@ def run(options: argparse.Namespace) -> int:
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
-    asked = Asked("effects", scene.name, (case_part(scene), *changes(options)), "effects")
-    publish(options, asked, effects_page.page(found), facts(found), effects_page.text(found))
+    wanted = asked("effects", scene, options, "effects")
+    publish(options, wanted, effects_page.page(found), facts(found), effects_page.text(found))
     return DONE if found.ablations[0].whole.status == "converged" else SOLVER_FAILED

@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 
 from fem_reference import export
-from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
+from fem_reference.cli import DONE, SOLVER_FAILED, lines, out, write_output
+from fem_reference.cli._cases import checked_bench, choose, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_output
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
 from fem_reference.foundations.errors import InputError
@@ -56,7 +56,6 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
     """Write the reference, with its states, and candidates for ParaView."""
     check(options.to)
     chosen = [choose(case, text, options.unit) for text in options.candidate]
-    check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(case, options, chosen)
     reference = _with_states(bench, again=options.solve)
     runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
@@ -68,9 +67,7 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states, where its solver has any; InputError where it was solved without them and is not to be solved
-    ``again``.
-    """
+    """The reference with its states; InputError where it was solved without them, unless it is to be solved ``again``."""
     choice = bench.scene.reference
     if not hasattr(bench.settings(choice, "reference"), "store_state"):
         return bench.reference()

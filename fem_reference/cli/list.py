@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference import metrics, solvers
-from fem_reference.cli._printing import DONE, out, write_output
+from fem_reference.cli import DONE, out, write_output
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING, Case
@@ -25,12 +25,14 @@ def run(options: argparse.Namespace) -> int:
     """Say what there is."""
     scenes = [casefile.read(name) for name in casefile.cases()]
     data = {scene.name: missing for scene in scenes if (missing := _data(scene)) is not None}
-    known = {name: _settings(name) for name in solvers.names()}
-    stored = [_stored(path.parent) for path in sorted((out(options) / "runs").rglob("run.json"))]
+    known, runs = {name: _settings(name) for name in solvers.names()}, (out(options) / "runs").rglob("run.json")
+    status = {path.parent: store.status(path.parent) for path in sorted(runs)}
+    stored = [str(folder) if end == "converged" else f"{folder} ({end})" for folder, end in status.items()]
     facts: dict[str, Any] = {"cases": {scene.name: scene.title for scene in scenes}, "data": data}
     facts |= {"solvers": solvers.names(), "settings": known, "metrics": metrics.names(), "runs": stored}
+    needs = {name: f" [needs data{f': {missing}' if missing else ', which is here'}]" for name, missing in data.items()}
     width = max(len(scene.name) for scene in scenes)
-    lines = ["cases:", *(f"  {scene.name:{width}}  {scene.title}{_mark(data.get(scene.name))}" for scene in scenes)]
+    lines = ["cases:", *(f"  {scene.name:{width}}  {scene.title}{needs.get(scene.name, '')}" for scene in scenes)]
     lines += ["solvers, with their settings and defaults:"]
     lines += [f"  {name:{width}}  {_in_words(settings)}" for name, settings in known.items()]
     lines += [f"metrics: {', '.join(facts['metrics'])}"]
@@ -50,13 +52,6 @@ def _data(case: Case) -> str | None:
     return f"{DATA_SETTING} has no {lacking[0]}" if lacking else ""
 
 
-def _mark(missing: str | None) -> str:
-    """A remark behind the title of a case that needs data."""
-    if missing is None:
-        return ""
-    return f" [needs data: {missing}]" if missing else " [needs data, which is here]"
-
-
 def _settings(name: str) -> dict[str, Any]:
     """The settings of a solver with their defaults, of all that it solves."""
     found: dict[str, Any] = {}
@@ -69,14 +64,6 @@ def _settings(name: str) -> dict[str, Any]:
 
 def _in_words(settings: dict[str, Any]) -> str:
     needed = ", ".join(key for key, value in settings.items() if value == REQUIRED)
-    given = {
-        key: "none" if value is None else json.dumps(value) for key, value in settings.items() if value != REQUIRED
-    }
-    known = ", ".join(f"{key} = {value}" for key, value in given.items())
+    given = {key: value for key, value in settings.items() if value != REQUIRED}
+    known = ", ".join(f"{key} = {'none' if value is None else json.dumps(value)}" for key, value in given.items())
     return "; ".join(filter(None, [f"{needed} (required)" if needed else "", known])) or "none"
-
-
-def _stored(folder: Path) -> str:
-    """A stored run, with its status where it did not converge."""
-    status = store.status(folder)
-    return str(folder) if status == "converged" else f"{folder} ({status})"

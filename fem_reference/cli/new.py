@@ -5,7 +5,7 @@ import os
 import shlex
 from pathlib import Path
 
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.units import LENGTH_UNITS
 from fem_reference.studies import new_scene

@@ -6,10 +6,9 @@ from pathlib import Path
 
 from fem_reference import report
 from fem_reference.assessment.claims import Cover
-from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._pages import case_part, publish, status
+from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written
@@ -24,17 +23,13 @@ from fem_reference.studies.execution import Bench
 HELP = "write a page over several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
-PAGES = {
-    "octave-examples": (
-        "The report's Octave examples",
-        ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure"),
-    )
-}
+EXAMPLES = "octave-examples"
+OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    names = sorted([*PAGES, TABLE, CLAIMS])
+    names = sorted([EXAMPLES, TABLE, CLAIMS])
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE} and {CLAIMS}: this case, not all of them; may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
@@ -57,13 +52,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _examples(options: argparse.Namespace) -> int:
     """Cases with all their candidates, one after the other."""
-    title, names = PAGES[options.name]
-    cases = [casefile.read(name) for name in names]
+    cases = [casefile.read(name) for name in OCTAVE]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
         results = tuple(judging.judged(bench, own_candidates(bench.scene)) for bench in benches)
-    asked = Asked("page", options.name, (Part((options.name,)),))
-    path, lines = written(asked, field_page.page(title, results), out(options), options.page_name)
+    asked = _asked([], options)
+    path, lines = written(
+        asked, field_page.page("The report's Octave examples", results), out(options), options.page_name
+    )
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)

@@ -6,9 +6,9 @@ import re
 
 from fem_reference.assessment.judge import in_unit
 from fem_reference.assessment.recommendation import recommend
-from fem_reference.cli._choosing import scene_of
+from fem_reference.cli import DONE, VERDICT_FAIL, out, write_output
+from fem_reference.cli._cases import scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report.recommendation_texts import facts, text
 from fem_reference.report.study_page import MAIN
@@ -45,7 +45,11 @@ def run(options: argparse.Namespace) -> int:
     if options.error is not None:
         limits["error"] = _number(options.error, options.error, units[metric], "--error")
     if options.time is not None:
-        limits["time"] = _time(options.time)
+        given = options.time.rstrip()
+        rate = next((unit for unit in _RATES if given.endswith(unit)), None)
+        each = _PER_FRAME.sub("", given) if rate is None else given.removesuffix(rate)
+        value = _number(options.time, each, "1" if rate else "s", "--time")
+        limits["time"] = 1 / value if rate else value
     if not limits:
         raise InputError("recommend", "nothing asked for", "--error or --time")
     setup = Bench(scene, out(options) / "runs").setup()
@@ -53,14 +57,6 @@ def run(options: argparse.Namespace) -> int:
     said = text(found, scene.name, metric, units[metric], limits.get("error", math.inf))
     write_output(facts(found, metric), said, options)
     return DONE if found.best else VERDICT_FAIL
-
-
-def _time(text: str) -> float:
-    """The time of a frame [s], from that or from frames a second."""
-    rate = next((unit for unit in _RATES if text.rstrip().endswith(unit)), None)
-    if rate is None:
-        return _number(text, _PER_FRAME.sub("", text), "s", "--time")
-    return 1 / _number(text, text.rstrip().removesuffix(rate), "1", "--time")
 
 
 def _number(given: str, text: str, unit: str, place: str) -> float:

@@ -5,10 +5,9 @@ import argparse
 from fem_reference import solvers
 from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
-from fem_reference.cli._choosing import refuse_error_bar, scene_of
-from fem_reference.cli._pages import judge, unturned
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli._cases import compared, scene_of, unturned
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
 from fem_reference.report.overview import run_text
@@ -35,8 +34,7 @@ def run(options: argparse.Namespace) -> int:
         write_output({"case": scene.name, "effects": found}, "\n".join(found), options)
         return DONE
     if options.solver is None or options.solver == scene.reference.solver:
-        return judge(scene, options, [])
-    refuse_error_bar(scene, options)
+        return compared(scene, options, [])
     if options.error_bar:
         raise InputError("--error-bar", "another solver", "the reference of a muscle")
     check(scene)

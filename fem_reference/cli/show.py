@@ -2,9 +2,9 @@
 
 import argparse
 
-from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
+from fem_reference.cli import DONE, lines, write_output
+from fem_reference.cli._cases import checked_bench, own_candidates, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, lines, write_output
 from fem_reference.report.overview import case_facts
 
 HELP = "what a case is made of; with --out also its meshes for ParaView"

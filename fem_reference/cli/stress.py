@@ -3,9 +3,9 @@
 import argparse
 
 from fem_reference.assessment.stress import facts
-from fem_reference.cli._pages import publish
+from fem_reference.cli import DONE
+from fem_reference.cli._cases import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part
@@ -29,10 +29,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
-    _check_reference(options)
-    found = running.run(
-        records.read_all(tuple(options.names)), options.solver, in_steps=options.steps, jitters=options.jitters
-    )
+    if options.jitters < 0:
+        raise InputError("--jitters", options.jitters, "0 or more")
+    for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
+        if wanted and options.solver and records.REFERENCE not in options.solver:
+            want = f"--solver {records.REFERENCE} too, which alone it is about"
+            raise InputError(name, f"it with {', '.join(options.solver)} alone", want)
+    hard = records.read_all(tuple(options.names))
+    found = running.run(hard, options.solver, in_steps=options.steps, jitters=options.jitters)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--solver", name), name) for name in options.solver]
     parts += [Part(("--steps",), "steps")] if options.steps else []
@@ -40,15 +44,3 @@ def run(options: argparse.Namespace) -> int:
     asked = Asked("stress", "stress", tuple(parts))
     publish(options, asked, stress_page.page(found), facts(found), stress_page.text(found))
     return DONE
-
-
-def _check_reference(options: argparse.Namespace) -> None:
-    """InputError where more runs of the reference are wanted than can be, or are wanted without it."""
-    if options.jitters < 0:
-        raise InputError("--jitters", options.jitters, "0 or more")
-    for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
-        if wanted and options.solver and records.REFERENCE not in options.solver:
-            others = ", ".join(options.solver)
-            raise InputError(
-                name, f"it with {others} alone", f"--solver {records.REFERENCE} too, which alone it is about"
-            )

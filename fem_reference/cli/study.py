@@ -4,15 +4,13 @@ import argparse
 from dataclasses import replace
 
 from fem_reference import solvers
-from fem_reference.assessment.cost_study import Study, facts
-from fem_reference.cli._pages import case_part, changes, publish
+from fem_reference.assessment.cost_study import facts
+from fem_reference.cli import DONE, SOLVER_FAILED, out
+from fem_reference.cli._cases import asked, case_part, changes, publish
 from fem_reference.cli._parser import CASE, share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, out
 from fem_reference.report import study_page
 from fem_reference.report.asked import Asked, Part, written
-from fem_reference.report.pages import Page
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers
 
@@ -41,26 +39,14 @@ def run(options: argparse.Namespace) -> int:
     scenes = [casefile.read_muscle(case, given) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
-    pages = _pages(found, scenes, options)
-    for asked, page in pages[:-1]:
-        written(asked, page, out(options))
+    more = [Part(("--solver", name), name) for name in options.solver]
+    own = {scene.name: asked("study", scene, options, PAGE, *more) for scene in scenes}
+    pages = [(own[case.case], study_page.page(replace(found, cases=(case,), missing={}))) for case in found.cases]
+    if len(pages) != 1:
+        named = [Part(case_part(scene).words, scene.name) for scene in scenes]
+        pages.append((Asked("study", PAGE, (*named, *changes(options), *more)), study_page.page(found)))
+    for one, page in pages[:-1]:
+        written(one, page, out(options))
     printed = {"cases": [facts(case, found.origin) for case in found.cases], "missing": found.missing}
     publish(options, *pages[-1], printed, study_page.text(found))
     return SOLVER_FAILED if found.missing else DONE
-
-
-def _pages(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) -> list[tuple[Asked, Page]]:
-    """The page of each case, and that of all of them last where there are several, or none."""
-    more = [*changes(options), *(Part(("--solver", name), name) for name in options.solver)]
-    parts = {scene.name: case_part(scene) for scene in scenes}
-    pages = [
-        (
-            Asked("study", case.case, (parts[case.case], *more), PAGE),
-            study_page.page(replace(found, cases=(case,), missing={})),
-        )
-        for case in found.cases
-    ]
-    if len(pages) != 1:
-        named = [Part(part.words, name) for name, part in parts.items()]
-        pages.append((Asked("study", PAGE, (*named, *more)), study_page.page(found)))
-    return pages

@@ -4,14 +4,12 @@ import argparse
 from typing import Any
 
 from fem_reference import solvers
-from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
+from fem_reference.cli import DONE, lines, write_output
+from fem_reference.cli._cases import checked_bench, own_candidates, scene_of
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, lines, write_output
 from fem_reference.problems import of_case
 from fem_reference.report.words import duration
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Case
-from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import expected
 
 HELP = "check all of a case that can be checked before it is solved, and say what running it will cost"
@@ -31,17 +29,12 @@ def run(options: argparse.Namespace) -> int:
     bench = checked_bench(scene, options, own_candidates(scene))
     for choice, place in [(scene.reference, "reference"), *own_candidates(scene)]:
         solvers.require(choice.solver, bench.settings(choice, place), place, scene.task)
-    facts = {"case": scene.name, "read": scene.place, "mesh": bench.problem().mesh_facts} | _facts(bench)
-    write_output(facts, "\n".join([*lines(facts), f"{scene.name} can be solved"]), options)
-    return DONE
-
-
-def _facts(bench: Bench[Case]) -> dict[str, Any]:
-    """Facts on the motion, the effects and the cost of a muscle; nothing of a scalar field."""
-    scene, body = bench.scene, bench.problem().body
-    known: dict[str, Any] = of_case.known(scene, bench.setup())
+    body = bench.problem().body
+    facts: dict[str, Any] = {"case": scene.name, "read": scene.place, "mesh": bench.problem().mesh_facts}
+    facts |= of_case.known(scene, bench.setup())
     if scene.reference.solver == "fenicsx" and body is not None:
         cost = expected(body, bench.settings(scene.reference, "reference"))
         time = f"about {duration(cost.seconds)} of processor time, within a factor of three"
-        known |= {"unknowns": cost.unknowns, "cost": f"{time}, for {len(scene.numbers)} frames"}
-    return known
+        facts |= {"unknowns": cost.unknowns, "cost": f"{time}, for {len(scene.numbers)} frames"}
+    write_output(facts, "\n".join([*lines(facts), f"{scene.name} can be solved"]), options)
+    return DONE

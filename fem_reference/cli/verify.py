@@ -4,9 +4,9 @@ import argparse
 import time
 
 from fem_reference.assessment.catalogue import Verification
-from fem_reference.cli._pages import publish
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL
+from fem_reference.cli._cases import publish
 from fem_reference.cli._parser import share
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL
 from fem_reference.foundations.version import __version__
 from fem_reference.report import verify_page
 from fem_reference.report.asked import Asked, Part
@@ -26,24 +26,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure problems whose answers are known."""
-    measured = _verify(options.names, options.negative_control)
+    """Measure problems whose answers are known: all, or those that are named."""
+    from fem_reference.verification.lab import lab  # loads the solvers
+
+    catalogue = runner.entries()
+    wrong = frozenset(runner.choose(catalogue, options.negative_control, "--negative-control"))
+    meant = {*runner.choose(catalogue, options.names, "NAME"), *wrong}
+    begin = time.perf_counter()
+    results = runner.run([entry for name, entry in catalogue.items() if name in meant or not meant], lab, wrong)
+    made_with = {"fem_reference": __version__, **versions()}
+    measured = Verification(results, time.perf_counter() - begin, made_with)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
     asked = Asked("verify", "verify", tuple(parts))
     publish(options, asked, verify_page.page(measured), verify_page.facts(measured), verify_page.text(measured))
     return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)
-
-
-def _verify(names: list[str], with_negative_control: list[str]) -> Verification:
-    """The results of the entries meant by ``names`` and ``with_negative_control`` (all where both are empty)."""
-    from fem_reference.verification.lab import lab  # loads the solvers
-
-    catalogue = runner.entries()
-    wrong = frozenset(runner.choose(catalogue, with_negative_control, "--negative-control"))
-    meant = {*runner.choose(catalogue, names, "NAME"), *wrong}
-    wanted = [entry for name, entry in catalogue.items() if name in meant or not meant]
-    begin = time.perf_counter()
-    results = runner.run(wanted, lab, wrong)
-    made_with = {"fem_reference": __version__, **versions()}
-    return Verification(results, time.perf_counter() - begin, made_with)

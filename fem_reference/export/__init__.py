@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fem_reference.export import febio, febio_differences, open_formats, texts
+from fem_reference.export import febio, febio_contact, open_formats, texts
 from fem_reference.export.folders import check, new_folder
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
@@ -40,7 +40,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format)
     open_formats.write(case, problem, folder)
     files.write_text(folder / "candidate.toml", texts.candidate())
     if form == "febio":
-        differences = febio_differences.notes(problem)
+        differences = febio_contact.notes(problem)
         for difference in differences:
             log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)

@@ -19,20 +19,9 @@ from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
-from fem_reference.export.febio_contact import add_contact, has_contact
-from fem_reference.export.febio_differences import notes
+from fem_reference.export import febio_mesh
+from fem_reference.export.febio_contact import add_contact, has_contact, notes
 from fem_reference.export.febio_material import add_fibres, add_materials
-from fem_reference.export.febio_mesh import (
-    Mesh,
-    bone_id,
-    by_springs,
-    exactly,
-    leaf,
-    leaves,
-    quadratic,
-    springs_id,
-    vector,
-)
 from fem_reference.export.open_formats import effect_name
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
@@ -70,7 +59,7 @@ def check(case: MuscleCase) -> None:
 
 def write(problem: MuscleProblem, folder: Path) -> None:
     """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
-    _, tets = quadratic(problem.mesh)
+    _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
     root = model(problem)
@@ -87,7 +76,7 @@ def model(problem: MuscleProblem) -> Element:
     SubElement(root, "Module", type="solid")
     _control(root, problem)
     add_materials(root, problem)
-    Mesh(problem).add_to(root)
+    febio_mesh.Mesh(problem).add_to(root)
     _domains(root, problem)
     add_fibres(root, problem)
     _motions(root, problem)
@@ -103,16 +92,16 @@ def _control(root: Element, problem: MuscleProblem) -> None:
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
-    leaves(control, settings)
+    febio_mesh.leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
     retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
-    leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
-    leaf(stepper, "dtmax", step, lc="1")
+    febio_mesh.leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
+    febio_mesh.leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")
     if has_contact(problem):
-        leaf(solver, "symmetric_stiffness", "non-symmetric")
-    leaves(solver, {"max_refs": 30, **TOLERANCES})
-    leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
+        febio_mesh.leaf(solver, "symmetric_stiffness", "non-symmetric")
+    febio_mesh.leaves(solver, {"max_refs": 30, **TOLERANCES})
+    febio_mesh.leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
 
 
 def _step(problem: MuscleProblem) -> float:
@@ -127,19 +116,20 @@ def _domains(root: Element, problem: MuscleProblem) -> None:
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
     SubElement(domains, "SolidDomain", name="muscle", mat="muscle", type=kind)
-    shells = {bone_id(bone): bone for bone in problem.bones}
-    shells |= {springs_id(attached): attached.bone for attached in by_springs(problem)}
+    shells = {febio_mesh.bone_id(bone): bone for bone in problem.bones}
+    shells |= {febio_mesh.springs_id(attached): attached.bone for attached in febio_mesh.by_springs(problem)}
     for name, bone in shells.items():
-        shell = SubElement(domains, "ShellDomain", name=name, mat=bone_id(bone))
-        leaf(shell, "shell_thickness", "0.01")
+        shell = SubElement(domains, "ShellDomain", name=name, mat=febio_mesh.bone_id(bone))
+        febio_mesh.leaf(shell, "shell_thickness", "0.01")
 
 
 def _motions(root: Element, problem: MuscleProblem) -> None:
-    if exactly(problem):
+    if febio_mesh.exactly(problem):
         boundaries = SubElement(root, "Boundary")
-        for attached in exactly(problem):
+        for attached in febio_mesh.exactly(problem):
             name = f"attached_{attached.attachment}"
-            leaf(SubElement(boundaries, "bc", name=name, type="rigid", node_set=name), "rb", bone_id(attached.bone))
+            entry = SubElement(boundaries, "bc", name=name, type="rigid", node_set=name)
+            febio_mesh.leaf(entry, "rb", febio_mesh.bone_id(attached.bone))
     rigid = SubElement(root, "Rigid")
     curves = _curve_numbers(problem)
     for bone in problem.bones:
@@ -147,13 +137,13 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
         places, angles = ("Rx", "Ry", "Rz"), ("Ru", "Rv", "Rw")
         fixed = (*places, *angles) if bone.motion is None else places if turns else angles
         moved = angles if turns else ("x", "y", "z")
-        entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_fixed", type="rigid_fixed")
-        leaves(entry, {"rb": bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
+        entry = SubElement(rigid, "rigid_bc", name=f"{febio_mesh.bone_id(bone)}_fixed", type="rigid_fixed")
+        febio_mesh.leaves(entry, {"rb": febio_mesh.bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
         for freedom, share in zip(moved, axis(bone), strict=False):
             kind = "rigid_rotation" if turns else "rigid_displacement"
-            entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_{freedom}", type=kind)
-            leaves(entry, {"rb": bone_id(bone), "dof": freedom})
-            leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
+            entry = SubElement(rigid, "rigid_bc", name=f"{febio_mesh.bone_id(bone)}_{freedom}", type=kind)
+            febio_mesh.leaves(entry, {"rb": febio_mesh.bone_id(bone), "dof": freedom})
+            febio_mesh.leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
 def axis(bone: Bone) -> list[float]:
@@ -187,10 +177,10 @@ def _curves(root: Element, problem: MuscleProblem) -> None:
 
 def _curve(data: Element, number: int, kind: str, points: list[tuple[float, float]]) -> None:
     curve = SubElement(data, "load_controller", id=str(number), type="loadcurve")
-    leaves(curve, {"interpolate": kind, "extend": "CONSTANT"})
+    febio_mesh.leaves(curve, {"interpolate": kind, "extend": "CONSTANT"})
     listed = SubElement(curve, "points")
     for time, value in points:
-        leaf(listed, "pt", vector((time, value)))
+        febio_mesh.leaf(listed, "pt", febio_mesh.vector((time, value)))
 
 
 def _output(root: Element) -> None:

@@ -86,9 +86,7 @@ def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
 
 
 def free_facets(problem: MuscleProblem) -> Ints:
-    """The facets (m, 3) of the tets that are in contact: those not attached in whose middle contact is felt; InputError where there
-    are none.
-    """
+    """The facets (m, 3) of tets in contact: not attached, and contact is felt in their middle; InputError without any."""
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
     loose = outer[~among(outer, attached)]

@@ -20,9 +20,7 @@ def check(folder: Path) -> None:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder beside ``folder`` to write into, which takes its place when all went well and is gone otherwise; InputError where it
-    is not free.
-    """
+    """A folder to write into: ``folder`` when all went well, else gone; InputError where that is not free."""
     folder = folder.resolve()
     check(folder)
     files.clear(folder)

@@ -64,8 +64,7 @@ def evaluate(text: str, position: Sequence[Any], functions: Mapping[str, Any]) -
                 return -value(operand)
             case ast.Call(ast.Name(id=name), [argument], []) if name in FUNCTIONS:
                 return functions[name](value(argument))
-        raise InputError(
-            "formula", f'"{text}"', f"a formula of {', '.join(known)}, + - * / ** and {', '.join(FUNCTIONS)}"
-        )
+        want = f"a formula of {', '.join(known)}, + - * / ** and {', '.join(FUNCTIONS)}"
+        raise InputError("formula", f'"{text}"', want)
 
     return value(ast.parse(text.strip(), mode="eval").body)

@@ -12,8 +12,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Indicator:
-    """Indicator of an effect: the ``estimate`` [mm] of the surface's displacement by it, root mean square at the worst frame; the
-    greatest ``stress`` [MPa] that it causes there; the ``number`` that people know it by, and what that is, the ``rule``.
+    """Indicator of an effect: an ``estimate`` [mm] of the displacement of the surface that it causes, root mean square at the
+    worst frame; the greatest ``stress`` [MPa] there; and the ``number`` by which it is known, with its ``rule``.
     """
 
     rule: str

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats
 
 
@@ -84,25 +85,27 @@ def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable
     return of
 
 
-class JetFunctions:
-    """``Functions`` of jets, numbers and arrays."""
-
-    exp = staticmethod(_differentiated(lambda v: (e := np.exp(v), e, e)))
-    log = staticmethod(_differentiated(lambda v: (np.log(v), 1 / v, -1 / v**2)))
-    sqrt = staticmethod(_differentiated(lambda v: (root := np.sqrt(v), 0.5 / root, -0.25 / (v * root))))
-    cos = staticmethod(_differentiated(lambda v: (cosine := np.cos(v), -np.sin(v), -cosine)))
-    sin = staticmethod(_differentiated(lambda v: (sine := np.sin(v), np.cos(v), -sine)))
-
-    def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-        """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
-        chosen = _value(x) > _value(limit)
-        like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
-        if like is None:
-            return np.where(chosen, then, otherwise)
-        one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
-        parts = ("value", "slope", "curvature")
-        return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
+def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+    """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
+    chosen = _value(x) > _value(limit)
+    like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
+    if like is None:
+        return np.where(chosen, then, otherwise)
+    one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
+    parts = ("value", "slope", "curvature")
+    return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
 
 
 def _value(x: Any) -> Any:
     return x.value if isinstance(x, Jet) else x
+
+
+# The functions of jets, numbers and arrays.
+JET_FUNCTIONS = Functions(
+    exp=_differentiated(lambda v: (e := np.exp(v), e, e)),
+    log=_differentiated(lambda v: (np.log(v), 1 / v, -1 / v**2)),
+    sqrt=_differentiated(lambda v: (root := np.sqrt(v), 0.5 / root, -0.25 / (v * root))),
+    cos=_differentiated(lambda v: (cosine := np.cos(v), -np.sin(v), -cosine)),
+    sin=_differentiated(lambda v: (sine := np.sin(v), np.cos(v), -sine)),
+    above=_above,
+)

@@ -11,9 +11,8 @@ def fact_table(title: str, facts: Mapping[str, object]) -> str:
     '<b>bar</b><table><tr><th style="text-align:left">status</th><td style="text-align:left">a &lt; b</td></tr></table>'
     """
     left = ' style="text-align:left"'
-    rows = (
-        f"<tr><th{left}>{escape(name)}</th><td{left}>{escape(str(value))}</td></tr>" for name, value in facts.items()
-    )
+    texts = ((escape(name), escape(str(value))) for name, value in facts.items())
+    rows = (f"<tr><th{left}>{name}</th><td{left}>{value}</td></tr>" for name, value in texts)
     return f"<b>{escape(title)}</b><table>{''.join(rows)}</table>"
 
 

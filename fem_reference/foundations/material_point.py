@@ -1,10 +1,33 @@
-"""The state at a point of a body, with the invariants that laws are written in."""
+"""The state at a point of a body, with the invariants that laws are written in, and the functions that they may call."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from fem_reference.foundations.functions import Functions, Numpy
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Functions:
+    """Functions that an expression may call besides operators: in numpy, symbolically, or with derivatives.
+
+    ``above(x, limit, then, otherwise)`` is ``then`` where ``x > limit``, else ``otherwise``; both are evaluated everywhere and must
+    be finite.
+    """
+
+    exp: Callable[[Any], Any]
+    log: Callable[[Any], Any]
+    sqrt: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    sin: Callable[[Any], Any]
+    above: Callable[[Any, Any, Any, Any], Any]
+
+
+def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+    return np.where(x > limit, then, otherwise)
+
+
+NUMPY = Functions(np.exp, np.log, np.sqrt, np.cos, np.sin, _above)
 
 
 @dataclass(frozen=True)
@@ -27,7 +50,7 @@ class State:
     predicted: Sequence[Any] = (0.0, 0.0, 0.0)
     F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rate: Any = 0.0
-    functions: Functions = field(default_factory=Numpy)
+    functions: Functions = NUMPY
 
     @property
     def J(self) -> Any:

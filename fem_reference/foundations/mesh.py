@@ -147,18 +147,16 @@ def check_finite(surface: Surface) -> None:
         raise InputError(surface.place, f"a point that is not finite (vertex {bad[0]})", "finite coordinates")
     if (farthest := np.abs(surface.points).max()) > FARTHEST:
         vertex = np.abs(surface.points).max(axis=1).argmax()
-        raise InputError(
-            surface.place, f"a coordinate of {farthest:.3g} mm (vertex {vertex})", f"at most {FARTHEST:g} mm"
-        )
+        got = f"a coordinate of {farthest:.3g} mm (vertex {vertex})"
+        raise InputError(surface.place, got, f"at most {FARTHEST:g} mm")
     check_corners(surface)
 
 
 def check_corners(surface: Surface) -> None:
     """InputError where a triangle names a point that is not there."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
-        raise InputError(
-            surface.place, "a triangle with a vertex that does not exist", f"0 to {len(surface.points) - 1}"
-        )
+        want = f"0 to {len(surface.points) - 1}"
+        raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
 
 
 def check_closed(surface: Surface) -> Surface:
@@ -177,13 +175,10 @@ def check_closed(surface: Surface) -> Surface:
         if len(wrong):
             first = place_of(points[wrong[0]].mean(axis=0))
             raise InputError(surface.place, f"{len(wrong)} {what}, the first at {first}", want)
-    twice = len(directed) - len(np.unique(directed, axis=0))
-    if twice:
-        raise InputError(
-            surface.place, f"{twice} edges that both their triangles run in the same direction", "one orientation"
-        )
-    lost = len(points) - len(np.unique(triangles))
-    if lost:
+    if twice := len(directed) - len(np.unique(directed, axis=0)):
+        got = f"{twice} edges that both their triangles run in the same direction"
+        raise InputError(surface.place, got, "one orientation")
+    if lost := len(points) - len(np.unique(triangles)):
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")
     _check_parts(surface)
     volume = enclosed_volume(points, triangles)
@@ -192,11 +187,18 @@ def check_closed(surface: Surface) -> Surface:
     return surface if volume > 0 else Surface(points, triangles[:, ::-1], surface.place)
 
 
-def _twins(triangles: Ints) -> tuple[Ints, Ints]:
-    """The two sides (e,), (e,) of each edge of a closed oriented surface; side 3 t + i leaves corner i of triangle t."""
+def twins(triangles: Ints) -> Ints:
+    """The two sides (e, 2) of each edge of a closed oriented surface; side 3 t + i leaves corner i of triangle t."""
     ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    pairs = np.lexsort(ends.T).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
+    return np.lexsort(ends.T).reshape(-1, 2)
+
+
+def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
+    """The number (count,) of the fan that each corner of triangles is in: around a vertex, those between which side ``one`` (e,)
+    is side ``other`` (e,), numbered as by :func:`twins`.
+    """
+    after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
+    return connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), count)
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
@@ -209,11 +211,9 @@ def _check_parts(surface: Surface) -> None:
     """InputError where the triangles around a vertex of a closed oriented surface are more than one fan, or where its triangles,
     connected by edges, are more than one part.
     """
-    one, other = _twins(surface.triangles)
-    after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
+    one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
-    fan = connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
-    _, corner = np.unique(fan, return_index=True)
+    _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)
     wrong = np.flatnonzero(np.bincount(corners[corner]) > 1)
     if len(wrong):
         first = f"vertex {wrong[0]} at {place_of(surface.points[wrong[0]])}"

@@ -4,15 +4,20 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import said
+
 Progress = Callable[[str], object]
 
 
 @contextmanager
 def reported(progress: Progress | None) -> Iterator[None]:
-    """Meanwhile each line of progress goes to ``progress``."""
+    """Meanwhile each line of progress goes to ``progress``; InputError unless it can be called, or is None."""
     if progress is None:
         yield
         return
+    if not callable(progress):
+        raise InputError("progress", said(progress), "a function of a line, such as print, or None")
     log = logging.getLogger("fem_reference")
     handler, level = _Calling(progress), log.level
     log.addHandler(handler)

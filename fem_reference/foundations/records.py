@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from fem_reference.foundations.errors import InputError
 
@@ -42,10 +42,11 @@ Name = Annotated[str, AfterValidator(check_name)]
 FileName = Annotated[str, AfterValidator(_check_file_name)]
 
 
-def parse[R: Record](record: type[R], table: object, place: str) -> R:
-    """``table`` as a ``record``; ``place`` is what its keys are reported below, for example ``"case.toml: effect[0]"``."""
+def parse[R](record: type[R], table: object, place: str) -> R:
+    """``table`` as a ``record`` or dataclass, whose keys are reported below ``place``, for example ``"case.toml: effect[0]"``."""
     try:
-        return record.model_validate(_turned(table, list, tuple))
+        strict = issubclass(record, Record)
+        return TypeAdapter(record).validate_python(_turned(table, list, tuple) if strict else table)
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
@@ -80,10 +81,10 @@ def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]
 
 def join(place: str, key: str) -> str:
     """``place`` with ``key`` below it: a file takes a colon, a key takes a dot."""
-    return place if not key else f"{place}{': ' if place.endswith('.toml') else '.'}{key}"
+    return place if not key else f"{place}{': ' if place.endswith(('.toml', '.json')) else '.'}{key}"
 
 
-def _as_input_error(first: Any, record: type[Record], place: str, table: object) -> InputError:
+def _as_input_error(first: Any, record: type, place: str, table: object) -> InputError:
     keys = _keys(table, first["loc"])
     path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in keys).lstrip(".")
     if first["type"] == "extra_forbidden":

@@ -1,13 +1,26 @@
-"""Python processes of our own: they import this copy of the package and nothing from the folder that they are started in."""
+"""Python processes of our own: how they are started and ended, the resources that they use, and folders that they share.
+
+They import this copy of the package and nothing from the folder that they are started in.
+"""
 
 import os
+import resource
+import shutil
 import sys
+import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 _STARTER = "FEM_REFERENCE_STARTER"
 _ROOT = Path(__file__).resolve().parent.parent.parent
+_PREFIX, _LOCK = "fem_reference_scratch-", ".lock"
+# So old [s] is a folder without a lock that nobody is about to take.
+_SETTLED = 60.0
 
 
 def command(*words: str) -> list[str]:
@@ -44,3 +57,52 @@ def lives(process: int) -> bool:
         return False
     except (OSError, IndexError):  # it is another's, or there is no /proc
         return True
+
+
+def forget_peak_memory() -> None:
+    """Watch the memory of this process anew, which may have been larger before; Linux can."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
+
+
+def processor_times(process: int) -> dict[int, float]:
+    """The processor time [s] by number of a ``process`` and of each that descends from it and has not ended; nothing where the
+    system does not say.
+    """
+    parents, times = dict[int, int](), dict[int, float]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError, ValueError, IndexError):  # it may end meanwhile
+            fields = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            number = int(path.parent.name)
+            parents[number] = int(fields[1])
+            times[number] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    found, size = {process} & set(times), 0
+    while len(found) > size:
+        size = len(found)
+        found |= {number for number, parent in parents.items() if parent in found}
+    return {number: times[number] for number in found}
+
+
+def peak_memory() -> float:
+    """The most memory [MB] since then, or since this process began."""
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder in the system's temporary one, locked as long as this process lives."""
+    _clear(Path(tempfile.gettempdir()))
+    with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name, FileLock(Path(name) / _LOCK):
+        yield Path(name)
+
+
+def _clear(root: Path) -> None:
+    """Remove what processes that were killed have left; what is not ours to remove stays."""
+    for path in root.glob(f"{_PREFIX}*"):
+        with suppress(OSError, Timeout):
+            if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():
+                with FileLock(path / _LOCK).acquire(timeout=0):
+                    shutil.rmtree(path)

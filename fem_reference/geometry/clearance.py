@@ -39,9 +39,7 @@ class Clearance:
 
 
 def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float) -> Clearance:
-    """The clearance of a spline with ``coefficients`` (i, j, k) of the B-splines about nodes; it has values between the second
-    nodes from either end.
-    """
+    """The clearance of a spline with ``coefficients`` (i, j, k) of B-splines, defined between the second nodes from either end."""
     low = _may_be_low(coefficients, level)
     nodes = np.zeros(coefficients.shape, bool)
     for corner in np.ndindex(2, 2, 2):

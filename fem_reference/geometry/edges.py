@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, twins
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Edges:
         """The edges of a closed, consistently oriented surface at rest; their areas sum to its own."""
         triangles = surface.triangles
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-        sides = np.lexsort(np.sort(ends, axis=1).T).reshape(-1, 2)
+        sides = twins(triangles)
         third = np.roll(triangles, -2, axis=1).ravel()
         areas = triangle_areas(surface.points, triangles) / 3
         return cls(ends[sides[:, 0]], sides // 3, third[sides], areas[sides // 3].sum(axis=1))

@@ -57,9 +57,7 @@ class Locator:
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
-        """The closest boundary triangles (n,). A closest point on an edge or corner is in several, whose tets extrapolate
-        differently: the first is taken, so that round-off does not choose.
-        """
+        """The closest boundary triangles (n,); of several at an edge or corner the first, so that round-off does not choose."""
         chosen = np.array(skin.triangle)
         for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):
             shared = self.faces[chosen[i]][skin.barycentric[i] >= _TIE]

@@ -47,8 +47,8 @@ class Extension:
 
 
 class _Edges:
-    """The e edges of m ``triangles`` (m, 3), each once: its ``ends`` (2, e); and for each corner of the triangles the edge
-    ``opposite`` to it (3, m), with the ``sense`` (3, m) of the triangle along it, 1 or -1.
+    """The e edges of m ``triangles`` (m, 3): their ``ends`` (2, e); and for each corner of the triangles the edge ``opposite`` to
+    it (3, m), with the ``sense`` (3, m) of the triangle along it, 1 or -1.
     """
 
     def __init__(self, triangles: Ints) -> None:

@@ -103,8 +103,7 @@ def trace(field: FibreField, count: int) -> Polylines:
     ahead, came_ahead = _follow(field, seeds, field.end, 1.0)
     whole = np.flatnonzero(came_back & came_ahead)[:count]
     if len(whole) < count:
-        want = f"at most {len(whole)}, the fibres that could be traced"
-        raise InputError("fibres.traced.count", count, want)
+        raise InputError("fibres.traced.count", count, f"at most {len(whole)}, the fibres that could be traced")
     lines = [_resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
     return Polylines(np.concatenate(lines), np.arange(count + 1) * _POINTS)
 
@@ -116,7 +115,6 @@ class NearestLine:
     lines: Polylines
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields that do not derive from others."""
         return {"lines": self.lines}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
@@ -143,10 +141,8 @@ def _gradients(mesh: TetMesh, values: Floats) -> Floats:
     slopes = np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0]
     volumes = np.repeat(tet_volumes(mesh.points, mesh.tets), 4)
     share = np.bincount(mesh.tets.ravel(), weights=volumes, minlength=len(mesh.points))
-    sums = [
-        np.bincount(mesh.tets.ravel(), weights=volumes * np.repeat(slope, 4), minlength=len(mesh.points))
-        for slope in slopes.T
-    ]
+    weighted = (volumes * np.repeat(slope, 4) for slope in slopes.T)
+    sums = [np.bincount(mesh.tets.ravel(), weights=one, minlength=len(mesh.points)) for one in weighted]
     return np.asarray(np.stack(sums, axis=1) / share[:, None])
 
 
@@ -193,9 +189,8 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
     going, points = np.arange(len(seeds)), seeds
-    for _ in range(
-        4 * int(field.locator.diagonal / abs(step))
-    ):  # a line four times as long as the mesh goes in circles
+    # A line four times as long as the mesh goes in circles.
+    for _ in range(4 * int(field.locator.diagonal / abs(step))):
         points = _runge_kutta(field, points, step)
         goes_on = field.between_attachments(points)
         going, points = going[goes_on], points[goes_on]

@@ -52,15 +52,13 @@ def overlaps(one: Floats, other: Floats) -> Floats:
     """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shorter of the displacements across
     either that bring the other to one side of it; 0 where either has no area.
     """
-    reaches = np.stack([_reach(one, other), _reach(other, one)])
-    return np.asarray(np.nan_to_num(reaches).min(axis=0))
+    return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
     """Penetration (k,) of ``triangles`` through the planes of ``walls``, on the side with less; NaN without area."""
-    across = normals(walls)
     with np.errstate(invalid="ignore", divide="ignore"):
-        across = across / np.linalg.norm(across, axis=1)[:, None]
+        across = (found := normals(walls)) / np.linalg.norm(found, axis=1)[:, None]
     heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)
     return np.asarray(np.minimum(heights.max(axis=1), -heights.min(axis=1)))
 

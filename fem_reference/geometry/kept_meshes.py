@@ -1,6 +1,8 @@
-"""Tetrahedra stored on disk: gmsh takes seconds to a minute, reading a hundredth of that."""
+"""Tetrahedra and other arrays stored on disk, as they take long to make: written atomically, made anew where damaged."""
 
 import importlib.metadata
+import logging
+import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -9,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
-from fem_reference.geometry.kept_arrays import kept
 
+log = logging.getLogger(__name__)
+
+Arrays = dict[str, Any]
 Mesher = Callable[[Surface, float, Mapping[str, Floats]], TetMesh]
 _MADE_WITH = ("gmsh", "pytetwild", "libigl", "numpy", "scipy")
 _FACETS = "facets "
@@ -44,11 +48,44 @@ def code() -> str:
     return f"{fingerprint(*sources)} {versions}"
 
 
-def _mesh(arrays: dict[str, Any]) -> TetMesh:
+def _mesh(arrays: Arrays) -> TetMesh:
     facets = {name.removeprefix(_FACETS): array for name, array in arrays.items() if name.startswith(_FACETS)}
     return TetMesh(arrays["points"], arrays["tets"], facets, str(arrays["maker"]))
 
 
-def _arrays(mesh: TetMesh) -> dict[str, Any]:
+def _arrays(mesh: TetMesh) -> Arrays:
     facets = {f"{_FACETS}{name}": facets for name, facets in mesh.facets.items()}
     return {"points": mesh.points, "tets": mesh.tets, "maker": np.array(mesh.maker)} | facets
+
+
+def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
+    """The value that ``of_arrays`` reads from the file at ``path``; without one that of ``make``, stored by ``to_arrays``."""
+    found = _read(path, of_arrays)
+    if found is None:
+        found = make()
+        _write(path, to_arrays(found))
+    return found
+
+
+def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
+    """The value in a file, None where none can be read completely."""
+    if not path.is_file():
+        return None
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return of_arrays(dict(arrays))
+    except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
+        log.warning("%s: damaged, made anew: %s", path, error)
+        return None
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    """Store arrays, safely for several processes; warn where they cannot be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
+            part = Path(folder) / path.name
+            np.savez(part, allow_pickle=False, **arrays)
+            part.replace(path)
+    except OSError as why:
+        log.warning("%s: not kept: %s", path, why)

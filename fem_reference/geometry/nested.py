@@ -1,7 +1,5 @@
 """Refinement of each tetrahedron into eight: nested, graded towards rims, with the boundary moved onto the filled surface."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,17 +41,6 @@ _ROUNDS, _SHORTER = 12, 0.6
 Bools = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """The edges of a mesh: ``ends`` (e, 2), the edges ``of_tets`` (k, 6) of each tet, and a new point on each edge, ``points``
-    (e, 3).
-    """
-
-    ends: Ints
-    of_tets: Ints
-    points: Floats
-
-
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
     """Tetrahedra each cut into eight, and the facets of regions into four.
 
@@ -61,23 +48,25 @@ def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) 
     boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far as
     tetrahedra stay valid; where it is None they stay.
     """
-    cut = _cut(mesh, _on_rims(mesh, rims))
-    points = np.concatenate([mesh.points, cut.points])
-    tets = _eighths(points, np.hstack([mesh.tets, len(mesh.points) + cut.of_tets]))
-    keys = cut.ends[:, 0] * len(mesh.points) + cut.ends[:, 1]
+    ends, of_tets, middles = _cut(mesh, _on_rims(mesh, rims))
+    points = np.concatenate([mesh.points, middles])
+    tets = _eighths(points, np.hstack([mesh.tets, len(mesh.points) + of_tets]))
+    keys = ends[:, 0] * len(mesh.points) + ends[:, 1]
     facets = {name: _quartered(faces, keys, len(mesh.points)) for name, faces in mesh.facets.items()}
     if surface is not None:
         points = _snapped(points, tets, surface)
     return TetMesh(points, tets, facets, mesh.maker)
 
 
-def _cut(mesh: TetMesh, on_rim: Bools) -> _Cut:
-    """The edges, each with its new point; ``on_rim`` (n,) are the points of the mesh on a rim."""
+def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
+    """The ends (e, 2) of the edges, the edges (k, 6) of each tet, and a new point (e, 3) on each edge; ``on_rim`` (n,) masks the
+    points of the mesh on a rim.
+    """
     ends, which = np.unique(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     first, second = on_rim[ends[:, 0]], on_rim[ends[:, 1]]
     at = np.where(first & ~second, GRADED, np.where(second & ~first, 1 - GRADED, 0.5))[:, None]
     points = mesh.points[ends[:, 0]] * (1 - at) + mesh.points[ends[:, 1]] * at
-    return _Cut(ends, which.reshape(-1, 6), points)
+    return ends, which.reshape(-1, 6), points
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
@@ -92,9 +81,7 @@ def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
 
 
 def _eighths(points: Floats, nodes: Ints) -> Ints:
-    """The tets (8 k, 4) of tets with ten ``nodes`` (k, 10), eight after eight: the octahedron in the middle is cut along its
-    shortest diagonal.
-    """
+    """The tets (8 k, 4) in tets with ten ``nodes`` (k, 10): the octahedron in the middle is cut along its shortest diagonal."""
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
     tets = np.take_along_axis(nodes, PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
@@ -113,8 +100,8 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points`` with boundary points moved to the nearest point of the surface, then all by one distance that keeps its
-    volume; less where the tets around them would become invalid.
+    """The ``points``, those of the boundary moved to the surface, then all by one distance that keeps its volume; less where
+    tets would become invalid.
     """
     faces, _ = boundary(tets)
     outer = np.unique(faces)
@@ -126,9 +113,8 @@ def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
     for _ in range(_ROUNDS):
         moved = np.array(points)
         moved[outer] += share[:, None] * away
-        bad = (tet_volumes(moved, tets) < _KEPT_VOLUME * volumes) | (
-            tet_qualities(moved, tets) < _KEPT_QUALITY * qualities
-        )
+        bad = tet_volumes(moved, tets) < _KEPT_VOLUME * volumes
+        bad |= tet_qualities(moved, tets) < _KEPT_QUALITY * qualities
         if not bad.any():
             return moved
         share[np.isin(outer, tets[bad])] *= _SHORTER

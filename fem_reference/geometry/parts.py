@@ -82,11 +82,8 @@ def _along_rims(parts: Parts) -> Floats:
     lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
     straight = -np.einsum("ij,ij->i", before, after) > _STRAIGHT * lengths
     direction = after - before
-    share = (
-        np.einsum("ij,ij->i", before + after, direction)
-        / np.maximum(np.einsum("ij,ij->i", direction, direction), _TINY)
-        / 2
-    )
+    squares = np.maximum(np.einsum("ij,ij->i", direction, direction), _TINY)
+    share = np.einsum("ij,ij->i", before + after, direction) / squares / 2
     points[inner] += np.where(straight, share, 0.0)[:, None] * direction
     return points
 
@@ -134,9 +131,7 @@ def _around_points(triangles: Ints, count: int) -> list[list[int]]:
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True where ``goes`` may move onto ``stays``: the surface stays manifold, its sharp edges stay, no triangle turns or gets
-    flatter than the flattest was.
-    """
+    """True where ``goes`` may move onto ``stays``: the surface stays manifold and sharp, no triangle turns or gets the flattest."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
     if len(here & there) != 4 or len(here | there) < 6:  # the two ends and two others; more than a tetrahedron
@@ -151,17 +146,14 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
     after = np.where(before == goes, stays, before)
     one, other = unit_normals(points[before]), unit_normals(points[after])
     cosines = np.einsum("ij,ij->i", one, other)
-    return bool(
-        (cosines > _SAME_SIDE).all() and _flatness(points, after).min() >= min(_flatness(points, old).min(), 0.5)
-    )
+    least = min(_flatness(points, old).min(), 0.5)
+    return bool((cosines > _SAME_SIDE).all() and _flatness(points, after).min() >= least)
 
 
 def _flatness(points: Floats, triangles: Ints) -> Floats:
     """4 sqrt(3) area over the sum of the squared sides of each triangle, (m,): 1 for an equilateral one, 0 for a flat one."""
-    sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
-    return np.asarray(
-        4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(np.sum(sides**2, axis=(1, 2)), _TINY)
-    )
+    squares = np.sum((points[triangles] - points[np.roll(triangles, 1, axis=1)]) ** 2, axis=(1, 2))
+    return np.asarray(4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(squares, _TINY))
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:

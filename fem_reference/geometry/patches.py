@@ -6,7 +6,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.pieces import edge_lengths
+from fem_reference.geometry.skins import edge_lengths
 
 # The most triangles of a draped patch: those of a patch of some metres.
 _MOST_TRIANGLES = 2**20
@@ -24,9 +24,8 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     points, triangles = patches.points, patches.triangles
     longest = _longest_side(points, triangles)
     if len(triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
-        raise InputError(
-            patches.place, f"landmarks {longest:.4g} mm apart", "those around one attachment, in the unit stated"
-        )
+        got = f"landmarks {longest:.4g} mm apart"
+        raise InputError(patches.place, got, "those around one attachment, in the unit stated")
     while _longest_side(points, triangles) > _SIDE:
         points, triangles = igl.upsample(points, triangles)
     return Surface(distances(points, bone_surface).closest, triangles, patches.place)

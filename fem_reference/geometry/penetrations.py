@@ -2,43 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import igl
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.distance import distances
+from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
 
 # Sample points of a triangle that crosses another surface: those of a grid of quarters, its corners among them.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
-
-
-@dataclass(frozen=True, eq=False)
-class ClosedSurface:
-    """A closed ``surface`` with the depths of points in it."""
-
-    surface: Surface
-
-    @cached_property
-    def _tree(self) -> igl.FastWindingNumberBVH:
-        tree = igl.FastWindingNumberBVH()
-        tree.init(self.surface.points, self.surface.triangles, 2)
-        return tree
-
-    def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) in it, 0 outside."""
-        found = np.zeros(len(points))
-        low, high = self.surface.points.min(axis=0), self.surface.points.max(axis=0)
-        some = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-        if len(some):
-            winding = self._tree.winding_number(np.ascontiguousarray(points[some]))
-            inside = some[np.ravel(winding) > 0.5]
-            found[inside] = distances(points[inside], self.surface).distance
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,23 +33,33 @@ class Depths:
         return float(beyond[worst]), self.places[worst]
 
 
-def depths(body: ClosedSurface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
+def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
     """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4); ``shape`` gives the distance to the bone.
 
     Depth in the bone is as exact as its distance field, depth in the body exact.
     """
     posed, back = bone.moved_to(apply(pose, bone.points)), np.linalg.inv(pose)
-    pairs = crossings(body.surface, posed)
+    pairs = crossings(body, posed)
 
     def into_bone(points: Floats) -> Floats:
         return np.maximum(-shape.sample(apply(back, points)).distance, 0.0)
 
     parts = [
-        *_of_surface(body.surface, np.unique(pairs[:, 0]), into_bone),
-        *_of_surface(posed, np.unique(pairs[:, 1]), body.depths),
+        *_of_surface(body, np.unique(pairs[:, 0]), into_bone),
+        *_of_surface(posed, np.unique(pairs[:, 1]), lambda points: depths_within(body, points)),
     ]
     values, places = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return Depths(values, places)
+
+
+def depths_within(body: Surface, points: Floats) -> Floats:
+    """Depths (n,) [mm] of ``points`` (n, 3) in a closed ``body``, 0 outside."""
+    found = np.zeros(len(points))
+    low, high = body.points.min(axis=0), body.points.max(axis=0)
+    some = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    within = some[inside(body, points[some])]
+    found[within] = distances(points[within], body).distance
+    return found
 
 
 def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats]) -> list[tuple[Floats, Floats]]:
@@ -81,14 +67,14 @@ def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floa
     they are deepest, and of vertices reached from their inside corners, or from one in each of its parts.
     """
     triangles, points = surface.triangles, surface.points
-    inside = np.zeros(len(points), bool)
+    within = np.zeros(len(points), bool)
     corners = np.union1d(triangles[crossing], _tips(triangles.tobytes()))
-    inside[corners] = depth(points[corners]) > 0
+    within[corners] = depth(points[corners]) > 0
     goes_on = np.delete(triangles, crossing, axis=0)
-    while (grown := inside[goes_on].any(axis=1) & ~inside[goes_on].all(axis=1)).any():
-        inside[goes_on[grown]] = True
+    while (grown := within[goes_on].any(axis=1) & ~within[goes_on].all(axis=1)).any():
+        within[goes_on[grown]] = True
     vertices, deepest, places = np.zeros(len(points)), np.zeros(len(triangles)), points[triangles[:, 0]]
-    vertices[inside] = depth(points[inside])
+    vertices[within] = depth(points[within])
     grid = np.einsum("gc,tci->tgi", _GRID, points[triangles[crossing]])
     found = depth(grid.reshape(-1, 3)).reshape(len(crossing), len(_GRID))
     deepest[crossing] = found.max(axis=1)
@@ -98,8 +84,6 @@ def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floa
 
 @lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
-    """A vertex of each part of a surface of ``triangles``, 64 bit integers: without a crossing, its side is that of the whole
-    part.
-    """
+    """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
     parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
     return np.unique(parts, return_index=True)[1]

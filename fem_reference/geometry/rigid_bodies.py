@@ -206,10 +206,8 @@ def _orthant(beyond: Floats) -> Sampled:
     nearest = np.arange(beyond.shape[1]) == beyond.argmax(axis=1)[:, None]
     distance = length + np.minimum(beyond.max(axis=1), 0)
     within = ~outside.any(axis=1)
-    bent = np.eye(beyond.shape[1]) * outside[:, :, None] - squares
-    return Sampled(
-        distance, np.where(within[:, None], nearest, away), np.where(within[:, None, None], 0, _over(bent, length))
-    )
+    bent = _over(np.eye(beyond.shape[1]) * outside[:, :, None] - squares, length)
+    return Sampled(distance, np.where(within[:, None], nearest, away), np.where(within[:, None, None], 0, bent))
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:

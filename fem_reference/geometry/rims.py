@@ -32,30 +32,16 @@ _TRIALS = 10  # of the level, to match the area
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
-    """A coarse surface with edges along the rims of attachments.
+    """A ``coarse`` surface with edges of length ``size`` [mm], cut along the rims of attachments; and the labels (m,) of its m
+    triangles: 0 free, i + 1 attached by attachment i. Attachments are defined on the ``fine`` surface, by the attached ``shares``
+    (k, 3) of the corners of its triangles.
 
     The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level of them that
     encloses their original area. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
     doi 10.1145/1276377.1276448, for surfaces).
-
-    Parameters
-    ----------
-    coarse, fine
-            The surface to cut, and the one on which attachments are defined.
-    shares
-        By attachment, the attached shares (k, 3) of the corners of the triangles of ``fine``.
-    size
-        The edge length of ``coarse`` [mm].
-
-    Returns
-    -------
-    surface, labels
-            Labels (m,) of its m triangles: 0 free, i + 1 attached by attachment i.
-
     """
-    parts = Parts(
-        coarse.points, coarse.triangles, np.zeros(len(coarse.triangles), np.int64), np.zeros(len(coarse.points), bool)
-    )
+    free = np.zeros(len(coarse.triangles), np.int64)
+    parts = Parts(coarse.points, coarse.triangles, free, np.zeros(len(coarse.points), bool))
     for label, attached in enumerate(shares.values(), start=1):
         area = attached_area(fine, attached)
         smooth = _smoothed(fine, attached, _SMOOTHED * size)
@@ -94,12 +80,11 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
     """The parts with a new point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
     number = _islands(fine, shares)
     attached = number >= 0
-    sizes = np.bincount(
-        number[attached], np.repeat(triangle_areas(fine.points, fine.triangles) / 3, 3).reshape(-1, 3)[attached]
-    )
+    thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
+    sizes = np.bincount(number[attached], thirds[attached])
     nearest = distances(parts.points, fine)
-    corner = nearest.barycentric.argmax(axis=1)
-    sizes[np.maximum(number[nearest.triangle, corner], 0)[number[nearest.triangle, corner] >= 0]] = 0
+    there = number[nearest.triangle, nearest.barycentric.argmax(axis=1)]
+    sizes[there[there >= 0]] = 0
     for island in np.flatnonzero(sizes >= least):
         peak = fine.triangles[number == island][shares[number == island].argmax()]
         at = int(distances(fine.points[[peak]], parts.surface).triangle[0])
@@ -241,9 +226,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Points and triangles after the ``chosen`` edges (k,) are cut at points of ``fine`` nearest to ``middles`` (k, 3), and the
-    original triangle of each.
-    """
+    """Points and triangles, ``chosen`` edges (k,) cut at ``middles`` (k, 3) moved to ``fine``, and each one's original triangle."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])
@@ -251,9 +234,7 @@ def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Fl
 
 
 def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
-    """Triangles cut at the points ``cuts`` (m, 3) on the edges opposite to their corners, -1 for none; and the original triangle
-    of each.
-    """
+    """Triangles cut at the points ``cuts`` (m, 3) opposite to their corners, -1 for none; and the original triangle of each."""
     count = (cuts >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
     one = np.flatnonzero(count == 1)

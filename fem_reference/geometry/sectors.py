@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas, unit_normals
+from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
 
 # Two triangles meet in a sharp edge where the angle between their normals is greater.
@@ -19,10 +19,7 @@ def sectors(surface: Surface) -> Ints:
     order = np.argsort(which, kind="stable")
     one, other = order[count[which[order]] == 2].reshape(-1, 2).T
     smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > _SHARP
-    one, other = one[smooth], other[smooth]
-    after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
-    first, second = np.concatenate([one, after_one]), np.concatenate([after_other, other])
-    return connected_parts(first, second, triangles.size).reshape(-1, 3)
+    return corner_fans(one[smooth], other[smooth], triangles.size).reshape(-1, 3)
 
 
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:

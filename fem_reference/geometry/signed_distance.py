@@ -24,10 +24,9 @@ from fem_reference.foundations.mesh import (
     triangle_areas,
 )
 from fem_reference.geometry.clearance import Clearance, of_spline
-from fem_reference.geometry.distance import distances
-from fem_reference.geometry.kept_arrays import kept
+from fem_reference.geometry.distance import distances, inside
+from fem_reference.geometry.kept_meshes import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
-from fem_reference.geometry.windings import inside
 
 # The distance [mm] outside a grid: far away from everything, but finite.
 FAR = 1e6
@@ -77,9 +76,7 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound of the depth [mm] of its deepest place: a spline is nowhere below its coefficients; infinite where nodes are
-        too far apart for a bound.
-        """
+        """A bound of the greatest depth [mm], by the least coefficient; infinite where nodes are too far apart for one."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
@@ -171,11 +168,7 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
         grid = resolve(surface, error, margin)
         return build(surface, grid.spacing, margin, rounding) if rounding > 0 else grid
 
-    return kept(folder / f"distance_{name[:32]}.npz", make, _arrays, _grid)
-
-
-def _arrays(grid: Grid) -> dict[str, Any]:
-    return vars(grid)
+    return kept(folder / f"distance_{name[:32]}.npz", make, lambda grid: vars(grid), _grid)
 
 
 def _grid(arrays: dict[str, Any]) -> Grid:
@@ -229,10 +222,7 @@ def _coefficients(values: Floats) -> Floats:
 
 
 def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
-    """The largest difference [mm] from the exact distance on the surface and at random points within a spacing of it.
-
-    Then the root of the mean square at those random points.
-    """
+    """The largest difference [mm] from the exact distance on the surface and near it; the root mean square near it."""
     around = _around(surface, grid.spacing)
     beside = grid.sample(around).distance - signed_distances(around, surface)
     largest = max(np.abs(grid.sample(_on(surface)).distance).max(), np.abs(beside).max())

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.foundations import scratch, subprocesses
+from fem_reference.foundations import subprocesses
 from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import (
     TET_FACES,
@@ -23,6 +23,7 @@ from fem_reference.foundations.mesh import (
     Surface,
     TetMesh,
     connected_parts,
+    diagonal,
     enclosed_volume,
     tet_volumes,
     triangle_areas,
@@ -43,32 +44,14 @@ _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tr
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
-    """Fill a closed surface with tetrahedra.
+    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. By gmsh they have ``facets``
+    by attachment, whose ``shares`` (m, 3) state how much of the corners of triangles is attached; their ``maker`` says who made
+    them. InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
 
     A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that
     does not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it
     moves with the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue
     72).
-
-    Parameters
-    ----------
-    surface
-        Closed and outward, of m triangles.
-    size
-            The requested edge length [mm].
-    shares
-        By attachment, the attached shares (m, 3) of the corners of triangles.
-
-    Returns
-    -------
-    TetMesh
-        With its ``maker``; by gmsh, ``facets`` by attachment, else none.
-
-    Raises
-    ------
-    InputError
-        Where no mesher succeeds, and at once where ``size`` is far too small or too large.
-
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -156,9 +139,8 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
                 coarse, labels = with_rims(coarse, surface, rims, size)
             if len(self_intersections(coarse)) == 0:
                 if shares and not rims:
-                    log.warning(
-                        "%s: without the rims of attachments, which would pass through the surface", surface.place
-                    )
+                    crossing = "without the rims of attachments, which would pass through the surface"
+                    log.warning("%s: %s", surface.place, crossing)
                 return _near(coarse, surface, size), labels
     return _near(coarse, surface, size), labels
 
@@ -175,7 +157,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 def run(mesher: str, surface: Surface, size: float) -> TetMesh:
     """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError where it crashes or takes too long."""
-    with scratch.folder() as folder:
+    with subprocesses.scratch_folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
         try:
@@ -243,13 +225,8 @@ def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
     import gmsh
 
     gmsh.initialize()
-    for option, value in (
-        ("General.Terminal", 0),
-        ("General.NumThreads", 1),
-        ("Mesh.MeshSizeMin", 0),
-        ("Mesh.MeshSizeMax", size),
-        ("Mesh.OptimizeNetgen", 1),
-    ):
+    options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.OptimizeNetgen": 1}
+    for option, value in {**options, "Mesh.MeshSizeMin": 0, "Mesh.MeshSizeMax": size}.items():
         gmsh.option.setNumber(option, value)
     skin = gmsh.model.addDiscreteEntity(2)
     gmsh.model.mesh.addNodes(2, skin, np.arange(1, len(points) + 1), points.ravel())
@@ -272,13 +249,9 @@ def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints
     """Points and tets within a twentieth of ``size`` of a surface that may pass through itself."""
     import pytetwild
 
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    near = size / 20 / diagonal(points)
     return pytetwild.tetrahedralize(  # type: ignore[no-any-return]
-        points,
-        triangles.astype(np.int32),
-        edge_length_abs=size,
-        epsilon=size / 20 / diagonal,
-        num_threads=1,
+        points, triangles.astype(np.int32), edge_length_abs=size, epsilon=near, num_threads=1
     )
 
 

@@ -6,7 +6,6 @@ Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/1
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -48,27 +47,10 @@ class Paths:
 
     def _on_surface(self, which: Ints, share: Floats) -> Floats:
         """The points (m, 3) after ``share`` (m,) of the path along the surface."""
-        first, last, axes, middles = (
-            self.touches[0][which],
-            self.touches[1][which],
-            self.axes[which],
-            self.middles[which],
-        )
+        first, last, axes, middles = (values[which] for values in (*self.touches, self.axes, self.middles))
         height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
         turned = _turned(first - middles - height, axes, share * self.turns[which])
         return np.asarray(middles + height + climb + turned)
-
-
-class WrappingSurface(Protocol):
-    """A surface that paths go around."""
-
-    def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) [mm] inside the surface; negative outside."""
-        ...
-
-    def around(self, starts: Floats, ends: Floats) -> Paths:
-        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]; points inside count as on the surface."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -79,15 +61,16 @@ class WrappingSphere:
     radius: float
 
     def depths(self, points: Floats) -> Floats:
-        """``radius - |x - centre|``."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the ball; negative outside."""
         return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """Along the great circle through both points; where they are opposite each other, one of them."""
-        normals = np.cross(starts - self.centre, ends - self.centre)
-        return _around(
-            starts, ends, np.asarray(self.centre), _perpendicular(normals, starts - self.centre), self.radius
-        )
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along the great circle through both, or one of them
+        where they are opposite each other; points inside count as on the surface.
+        """
+        arms = starts - self.centre
+        axes = _perpendicular(np.cross(arms, ends - self.centre), arms)
+        return _around(starts, ends, np.asarray(self.centre), axes, self.radius)
 
 
 @dataclass(frozen=True)
@@ -99,11 +82,11 @@ class WrappingCylinder:
     radius: float
 
     def depths(self, points: Floats) -> Floats:
-        """``radius`` minus the distance from the axis."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the cylinder; negative outside."""
         return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """Along a helix, the shorter path round."""
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along a helix; points inside count as on it."""
         axis = self._unit()
         one, other = (_across(points - self.point, axis) for points in (starts, ends))
         senses = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)

@@ -171,9 +171,8 @@ def write_field(
 def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
     """PVD index: the time of each file (of frames their number), which is named relative to the index."""
     entries = "".join(f'<DataSet timestep="{time}" file={quoteattr(name)}/>\n' for time, name in frames)
-    write_text(
-        path, f'<?xml version="1.0"?>\n<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
-    )
+    collection = f'<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
+    write_text(path, f'<?xml version="1.0"?>\n{collection}')
 
 
 def write_text(path: Path, text: str) -> None:

@@ -4,8 +4,11 @@ A file is refused where it is no such text, is too large, is nested deeper than 
 """
 
 import json
+import math
 import re
 import tomllib
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -35,13 +38,7 @@ def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
     """The table of a TOML text; InputError at ``place``."""
     if (long := _LONG_KEY.search(_NO_KEYS.sub("_", text))) is not None:
         raise InputError(place, f'the key "{long[0]}"', f"{want} with keys of at most {DEEPEST} parts")
-    try:
-        table = tomllib.loads(text)
-    except RecursionError as error:
-        raise _too_deep(place, want) from error
-    except ValueError as error:
-        raise InputError(place, str(error), want) from error
-    _check_depth(table, place, want)
+    table: dict[str, Any] = _parsed(tomllib.loads, text, place, want)
     return table
 
 
@@ -56,15 +53,7 @@ def toml_text(text: str) -> str:
 
 def read_json(path: Path, want: str) -> Any:
     """The value of a JSON file, ``want`` of messages; numbers that are not finite are none."""
-    text = _text(path, MOST_JSON, want)
-    try:
-        value = json.loads(text, parse_constant=_no_number)
-    except RecursionError as error:
-        raise _too_deep(path, want) from error
-    except ValueError as error:
-        raise InputError(path, str(error), want) from error
-    _check_depth(value, path, want)
-    return value
+    return _parsed(partial(json.loads, parse_constant=_no_number), _text(path, MOST_JSON, want), path, want)
 
 
 def parsed_xml(path: Path) -> ElementTree.Element:
@@ -86,6 +75,15 @@ def beside(path: Path, name: str) -> Path:
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
     return found
+
+
+def finite(value: float) -> float | None:
+    """``value`` for JSON: None where it is not finite.
+
+    >>> finite(2), finite(float("nan"))
+    (2.0, None)
+    """
+    return float(value) if math.isfinite(value) else None
 
 
 def is_file(path: Path) -> bool:
@@ -116,17 +114,20 @@ def _no_number(name: str) -> float:
     raise ValueError(f"{name}, which is no JSON number")
 
 
-def _too_deep(place: object, want: str) -> InputError:
-    return InputError(place, f"tables or lists more than {DEEPEST} deep", want)
-
-
-def _check_depth(value: Any, place: object, want: str) -> None:
-    level = [value]
-    for _ in range(DEEPEST + 1):
-        level = [inside for one in level for inside in _inside(one) if isinstance(inside, dict | list)]
-        if not level:
-            return
-    raise _too_deep(place, want)
+def _parsed(loads: Callable[[str], Any], text: str, place: object, want: str) -> Any:
+    """The value that ``loads`` reads from a text; InputError where it reads none, or one that is nested too deep."""
+    try:
+        value = loads(text)
+        level = [value]
+        for _ in range(DEEPEST + 1):
+            level = [inside for one in level for inside in _inside(one) if isinstance(inside, dict | list)]
+            if not level:
+                return value
+    except RecursionError:
+        pass
+    except ValueError as error:
+        raise InputError(place, str(error), want) from error
+    raise InputError(place, f"tables or lists more than {DEEPEST} deep", want)
 
 
 def _inside(value: Any) -> Any:

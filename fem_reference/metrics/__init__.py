@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/contracts/test_every_metric.py): zero against itself, a known change gives a known value, NaN stays NaN, units
-stated. Each describes its ``STATISTICS``, and states what of a run it is ``OF`` (its surface, its lines, its field) and
-what it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
+Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change a known value, NaN stays NaN, and
+units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it is ``OF`` (surface, lines or field)
+and the standard that it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or the run itself.
 """
 
 import importlib
@@ -23,20 +23,20 @@ from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
-# Places that a statistic is shown at: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
-# its sentence; ``curve``, drawings of changes from rest; ``solvers``, the tables of solvers, and ``scenes``, that over all scenes;
+# Places where pages show a statistic: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
+# its sentence; ``curve``, drawings of changes from rest; ``solvers``, tables of solvers; ``scenes``, the table over all scenes;
 # ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
 Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """A statistic as its metric describes it.
+    """The description of a statistic by its metric.
 
-    ``title`` and ``part``: the words above a group of columns and above its own; ``headline``: a sentence with ``{}`` in place of
-    its value; ``curve``: the title of the drawing of its changes from rest; ``share_of``: what a per cent is of; ``shown``: by
-    place, its position there, the least first; ``local``: True where its error is of the order that it is of at the worst place,
-    ``lone`` where it is the value of one fibre alone.
+    ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
+    ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
+    position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
+    for the value of a single fibre.
     """
 
     unit: str
@@ -56,14 +56,14 @@ class Statistic:
 
     @property
     def full_unit(self) -> str:
-        """The unit, of a per cent with what it is of."""
+        """The unit, for a per cent with its whole."""
         return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
 
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), from 0 on where these are not given;
-    ``where`` (f,), in words, each is worst; ``error_bars`` (f,) of the reference that it is measured against, None without any.
+    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 where not given; the
+    place ``where`` (f,) each is worst, in words; ``error_bars`` (f,) of the reference, None where it has none.
     """
 
     metric: str
@@ -76,12 +76,12 @@ class Measure:
 
     @property
     def worst(self) -> "Worst":
-        """The frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
+        """The frame with the greatest magnitude; a value that is not a number counts as the greatest."""
         return self._at(np.where(np.isnan(self.values), np.inf, np.abs(self.values)))
 
     @property
     def worst_number(self) -> "Worst | None":
-        """The worst of the frames whose value is a finite number, None without any."""
+        """The worst frame among those with a finite value, None where there are none."""
         known = np.isfinite(self.values)
         return self._at(np.where(known, np.abs(self.values), -1.0)) if known.any() else None
 
@@ -99,8 +99,8 @@ class Measure:
 
 @dataclass(frozen=True)
 class Worst:
-    """A measure at its worst frame: its ``value`` and the ``error_bar`` of the reference there, None without any, in ``unit``, at
-    the number of the ``frame``, the one with this ``index``; ``where`` in words.
+    """A measure in its worst ``frame`` (a number, at ``index``): its ``value`` and the ``error_bar`` of the reference, None where
+    there is none, both in ``unit``; ``where``: the place in words.
     """
 
     value: float
@@ -113,10 +113,9 @@ class Worst:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementContext:
-    """The context that every run of a scene is measured in: ``areas`` (n,) [mm2] around the surface's vertices at rest,
-    the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
-    greatest displacement of the reference's surface over its frames, the ``bones``, and what is
-    ``exempt`` from contact with them.
+    """The common context of all measurements of a case: ``areas`` (n,) [mm2] around the surface's vertices at rest, the ``fibres``
+    at rest, the ``extension`` of a surface's displacement to their points, ``travel`` [mm], the greatest displacement of the
+    reference's surface over its frames, the ``bones``, and the part ``exempt`` from contact with them.
     """
 
     areas: Floats
@@ -130,7 +129,7 @@ class MeasurementContext:
     def of(
         cls, reference: Run, fibres: Polylines, bones: tuple[Bone, ...], exempt: Exemption | None = None
     ) -> "MeasurementContext":
-        """The measurement context of a reference run; without ``exempt``, nothing is."""
+        """The measurement context of a reference run; nothing is exempt by default."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
@@ -144,7 +143,7 @@ class MeasurementContext:
 
 @dataclass(frozen=True)
 class FieldContext:
-    """The context of every run of a scalar case: the formula of the ``exact`` solution, None where it is not known."""
+    """The context of all measurements of a scalar case: the formula of the ``exact`` solution, None where it is not known."""
 
     exact: str | None
 
@@ -157,8 +156,8 @@ def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
 @overload
 def context_of(setup: CaseSetup, reference: Run) -> Context: ...
 def context_of(setup: CaseSetup, reference: Run) -> Context:
-    """The :data:`Context` of the runs of a case from its ``setup`` and its ``reference``; InputError where that does not have what
-    others are measured against.
+    """The :data:`Context` of the runs of a case from its ``setup`` and ``reference``; InputError where the reference of a muscle
+    lacks its surface or its fibres.
     """
     if "field" in reference.carries:
         return FieldContext(setup.exact)
@@ -188,14 +187,14 @@ def metric(name: str) -> Metric:
 
 
 def names(against: Collection[Standard] | None = None) -> list[str]:
-    """The metrics there are: all, or those measured ``against`` one of these."""
+    """The names of all metrics, or of those measured ``against`` one of these standards."""
     found = sorted(module.name for module in pkgutil.iter_modules(__path__))
     return [name for name in found if against is None or metric(name).AGAINST in against]
 
 
 @cache
 def described(where: Shown | None = None) -> dict[tuple[str, str], Statistic]:
-    """Every statistic by metric and name: all, or those that are shown somewhere, in the order that they have there."""
+    """The statistics by metric and name: all, or those shown at one place, in their order there."""
     found = {(name, one): each for name in names() for one, each in metric(name).STATISTICS.items()}
     if where is None:
         return found
@@ -209,7 +208,7 @@ def in_tables() -> tuple[str, ...]:
 
 
 def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
-    """The unit of every ``metric.statistic`` there is: all, or those ``of`` such parts and ``against`` such standards."""
+    """The units by ``metric.statistic``: of all metrics, or of those ``of`` these parts and ``against`` these standards."""
     chosen = {name: metric(name) for name in names(against)}
     return {
         f"{name}.{statistic}": described.unit
@@ -220,13 +219,13 @@ def units(of: Collection[Part] | None = None, against: Collection[Standard] | No
 
 
 def of_itself(name: str) -> bool:
-    """True where the metric ``name`` says something of a run alone, whatever it is measured against."""
+    """True where the metric ``name`` describes a run alone and does not depend on a reference."""
     return metric(name).AGAINST != "reference"
 
 
 def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
-    the same frames. Of a run only what it carries.
+    the same frames. Metrics of a part that the run does not carry are left out.
     """
     chosen = map(metric, names() if wanted is None else wanted)
     return tuple(
@@ -238,8 +237,8 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from the ``values`` (f,) of its statistics, all worst at the same places (f,) in words,
-    nowhere in particular without any.
+    """The measures of the metric ``name`` from the ``values`` (f,) by statistic; all are worst at the places ``where`` (f,), in
+    words, or at no particular place.
     """
     stated = metric(name).STATISTICS
     return tuple(
@@ -248,12 +247,12 @@ def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = (
 
 
 def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
-    """The measure of that name, None where it was not taken."""
+    """The measure of this metric and statistic, None where there is none."""
     return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
 
 
 def at_rest(run: Run) -> Run:
-    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run reports its change from rest."""
+    """The rest state of ``run`` and its fibres, repeated over its frames: the standard for its change from rest."""
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
@@ -261,15 +260,15 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """Every statistic of the change from rest of a ``run`` of the reference's solver, on the fibres inside it: where overlaps with
-    bones are removed first, two runs begin with them in other places, and their lengths would else be taken from the surface.
+    """Every statistic of the change from rest of a ``run`` of the reference's solver, on its own fibres: where overlaps with bones
+    are removed first, the fibres of two runs begin in different places, and the surface would carry them instead.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
-    """The places of ``vertices`` (f,) of the mesh of a field, in words."""
+    """The ``vertices`` (f,) of the mesh of a field and their places, in words."""
     places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)
     return tuple(f"vertex {vertex} at ({place})" for vertex, place in zip(vertices, places, strict=True))
 

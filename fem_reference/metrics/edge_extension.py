@@ -42,18 +42,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """The edge of each frame that deviates most, in words.
-
-    Parameters
-    ----------
-    edges
-        Of the surface, e of them.
-    deviations
-        (f, e); the greatest in magnitude counts.
-    reference
-        Where the edge is in it is added.
-
-    """
+    """In each frame the edge with the ``deviations`` (f, e) of greatest magnitude, and its place in the reference, in words."""
     ends = edges.ends[np.argmax(np.abs(deviations), axis=1)]
     middles = reference.positions[np.arange(len(ends))[:, None], ends].mean(axis=1)
     return tuple(

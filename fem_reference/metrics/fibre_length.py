@@ -9,7 +9,7 @@ a straight line is shorter than the fibre. That is its error, and no change of l
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, MeasurementContext, Statistic
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.runs.store import Run
 
 _TITLE = "Fibre length"
@@ -46,19 +46,14 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     """
     lengths = _direct if _carries(run, context) and _carries(reference, context) else _extended
     longer = lengths(run, context) - lengths(reference, context)
-    percent = 100 * longer / context.fibres.lengths()
-    statistics = (
-        ("mean", longer.mean(axis=1), longer),
-        ("rms", _rms(longer), longer),
-        ("max", np.abs(longer).max(axis=1), longer),
-        ("mean_percent", percent.mean(axis=1), percent),
-        ("rms_percent", _rms(percent), percent),
-        ("max_percent", np.abs(percent).max(axis=1), percent),
-    )
-    return tuple(
-        Measure("fibre_length", name, STATISTICS[name].unit, values, _worst(deviations))
-        for name, values, deviations in statistics
-    )
+    return _statistics(longer, "") + _statistics(100 * longer / context.fibres.lengths(), "_percent")
+
+
+def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:
+    """Mean, rms and greatest magnitude over the fibres of ``longer`` (f, k), under these names and a ``suffix``."""
+    rms = np.sqrt(np.mean(longer**2, axis=1))
+    values = {"mean": longer.mean(axis=1), "rms": rms, "max": np.abs(longer).max(axis=1)}
+    return measures("fibre_length", {f"{name}{suffix}": each for name, each in values.items()}, _worst(longer))
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -93,10 +88,6 @@ def _direct(run: Run, context: MeasurementContext) -> Floats:
 def _extended(run: Run, context: MeasurementContext) -> Floats:
     """Length of each fibre in each frame (f, k) [mm], on points that the surface carries along."""
     return np.array([context.fibres.lengths(context.extension.apply(points)) for points in run.positions])
-
-
-def _rms(deviations: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.mean(deviations**2, axis=1)))
 
 
 def _worst(deviations: Floats) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, place_of, triangle_areas
-from fem_reference.geometry.windings import outer_windings
-from fem_reference.metrics import Measure, MeasurementContext, Statistic
+from fem_reference.geometry.distance import outer_windings
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.runs.store import Run
 
 STATISTICS = {"inside_out": Statistic("%"), "overlapping": Statistic("%")}
@@ -24,16 +24,11 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     """
     windings, wanted = _windings(run), _windings(reference)
     areas = triangle_areas(reference.surface.points, reference.surface.triangles)
-    return tuple(
-        Measure(
-            "inversion",
-            name,
-            STATISTICS[name].unit,
-            _share(sign * windings, areas) - _share(sign * wanted, areas),
-            where,
-        )
-        for name, sign in (("inside_out", -1), ("overlapping", 1))
-        for where in [_first(sign * windings, run)]
+    inside_out = _share(-windings, areas) - _share(-wanted, areas)
+    overlapping = _share(windings, areas) - _share(wanted, areas)
+    return (
+        *measures("inversion", {"inside_out": inside_out}, _first(-windings, run)),
+        *measures("inversion", {"overlapping": overlapping}, _first(windings, run)),
     )
 
 

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.geometry.lagrange import l2_distance
+from fem_reference.geometry.field_mesh import l2_distance
 from fem_reference.metrics import FieldContext, Measure, Statistic, measures
 from fem_reference.problems.scalar import at
 from fem_reference.runs.store import Run

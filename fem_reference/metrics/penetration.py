@@ -4,7 +4,8 @@ By the same distance field as contact, and where contact is exempt too: there it
 """
 
 import logging
-from functools import lru_cache
+from functools import lru_cache, partial
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,8 @@ from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume, pla
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.overlap import shared
-from fem_reference.geometry.pieces import edge_lengths
-from fem_reference.metrics import Measure, MeasurementContext, Statistic
+from fem_reference.geometry.skins import edge_lengths
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Run
 
@@ -36,6 +37,7 @@ _FOLLOWS = 4.0
 # Deeper than this share of its half thickness is in the middle of a bone, which may be on its way out of the other side.
 _MIDDLE = 0.75
 
+_value = attrgetter("value")
 log = logging.getLogger(__name__)
 
 
@@ -73,12 +75,11 @@ def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
         [_Worst(np.nan, lost)] * 2 if lost or not _is_body(surface) else _frame(surface, number, context, allowed)
         for number, surface in zip(run.numbers, map(run.surface.moved_to, run.positions), strict=True)
     ]
-    return tuple(
-        Measure(
-            "penetration", name, stated.unit, np.array([one.value for one in found]), tuple(one.where for one in found)
-        )
-        for (name, stated), found in zip(STATISTICS.items(), zip(*frames, strict=True), strict=True)
+    deepest, volume = (
+        measures("penetration", {name: np.array([one.value for one in found])}, [one.where for one in found])
+        for name, found in zip(STATISTICS, zip(*frames, strict=True), strict=True)
     )
+    return deepest + volume
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -88,7 +89,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
     fine = Surface(exempt.corners.carried @ surface.points, exempt.corners.at)
     for bone in context.bones:
         there = apply(bone.pose(number), bone.surface.points)
-        inside = shared(fine, exempt.felt, lambda points, bone=bone: _distance(bone, number, points), there)  # type: ignore[misc]
+        inside = shared(fine, exempt.felt, partial(bone.distances, number), there)
         found = _deepest(exempt, fine, bone, number, allowed[bone.name])
         if inside.deepest > _MIDDLE * bone.shape.half_thickness:
             found = max(found, _Worst(inside.deepest, f"around the middle of {bone.name}"), key=_value)
@@ -101,7 +102,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
 def _deepest(exempt: Exemption, fine: Surface, bone: Bone, number: int, allowed: Floats) -> _Worst:
     """Depth beyond what is ``allowed`` (k,) at the points (k,) of a surface in pieces."""
     corners, reach = exempt.corners, exempt.reach
-    gaps = _distance(bone, number, fine.points)
+    gaps = bone.distances(number, fine.points)
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])
     follows = (np.abs(gaps[triangles]) <= reach).all(axis=1) & (lengths <= _FOLLOWS * reach).all(axis=1)
@@ -134,15 +135,6 @@ def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, .
     """True where a ``bone`` has this ``name`` or moves as the one that has."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
-
-
-def _value(one: _Worst) -> float:
-    return one.value
-
-
-def _distance(bone: Bone, number: int, points: Floats) -> Floats:
-    """Distance (n,) [mm] of ``points`` (n, 3) to ``bone`` where it is at frame ``number``, negative inside."""
-    return bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance
 
 
 @np.errstate(over="ignore", invalid="ignore")

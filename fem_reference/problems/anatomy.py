@@ -23,8 +23,8 @@ _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 -
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices (k,) of the muscle's ``surface``, sorted, that ``case.attachment[i]`` selects, with its ``bone_surface``;
-    InputError names the unusable key of the case, or the file and row (comment lines not counted).
+    """The vertices (k,) of the muscle's ``surface``, sorted, that ``case.attachment[i]`` selects, with its
+    ``bone_surface``; InputError names the unusable key of the case, or the file and row (comment lines not counted).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -41,9 +41,9 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part, although they do
-    not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): those of the
-    corners of the triangles of ``surface``.
+    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part,
+    although they do not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares``
+    (k, 3): those of the corners of the triangles of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -120,8 +120,8 @@ TETS = 8000
 
 
 def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case, and their direction at any point. They are given as polylines, with the direction of the nearest, or
-    traced in tetrahedra of a size [mm] with which ``fill`` fills the closed ``surface`` of the muscle.
+    """The fibres of a case, and their direction at any point. They are given as polylines, with the direction of the
+    nearest, or traced in tetrahedra of a size [mm] with which ``fill`` fills the closed ``surface`` of the muscle.
     """
     if (lines := _given(case)) is not None:
         return inside(surface, lines), NearestLine(lines)

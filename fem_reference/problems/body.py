@@ -65,8 +65,9 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
-    displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs it.
+    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects:
+    its displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs
+    it.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -103,9 +104,9 @@ def reference_nodes(kind: Kind, degree: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The mesh of a body: ``points`` (n, 3) [mm] at rest, and ``cells`` (m, k), the indices of the points of each cell in the
-    order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved ones. ``facets``: by name of a region of the surface,
-    the corners (f, 3 or 4) of its facets.
+    """The mesh of a body: ``points`` (n, 3) [mm] at rest, and ``cells`` (m, k), the indices of the points of each cell
+    in the order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved ones. ``facets``: by name of a
+    region of the surface, the corners (f, 3 or 4) of its facets.
     """
 
     points: Floats
@@ -117,10 +118,10 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
-    reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
-    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm] of springs over the
-    area that pull towards the path; None: exact. A skin has springs only.
+    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its
+    reaction force is reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a
+    picklable callable of rest points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm].
+    ``stiffness`` [MPa/mm] of springs over the area that pull towards the path; None: exact. A skin has springs only.
     """
 
     name: str
@@ -199,9 +200,7 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which a load step ends, so that none skips over motion within it; InputError where a path cannot be
-        followed.
-        """
+        """Frame numbers at which load steps end, to skip no motion; InputError where a path cannot be followed."""
         things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)

@@ -188,9 +188,8 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
         if not facets:
             raise InputError(f"facets.{name}", "none", "facets of one cell each")
         if lost:
-            got = (
-                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
-            )
+            some = f"{len(lost)} of {len(facets)}, the first with corners {lost[0]}"
+            got = f"facets that are not of one cell each ({some})"
             raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
 
 
@@ -252,7 +251,7 @@ def _shared(mesh: Cells, one: str, other: str) -> Floats:
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:
-        facets = np.sort(mesh.facets[name], axis=1)
+        facets = np.sort(mesh.facets[name].astype(np.int64), axis=1)  # a product of two indices may need it
         pairs = facets[:, list(combinations(range(facets.shape[1]), 2))]
         return np.asarray(pairs[..., 0] * count + pairs[..., 1])
 

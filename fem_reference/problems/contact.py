@@ -1,4 +1,4 @@
-"""Contact with bones: the obstacles of a body, and the law of the contact pressure."""
+"""Contact with bones: the bones around a body, and the law of the contact pressure."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -26,9 +26,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ContactBone:
-    """An obstacle: its ``shape`` in its own rest frame, and its ``pose``, a callable from a frame number to its 4 x 4 matrix;
-    both picklable.
-    """
+    """A bone: its ``shape`` at rest, and its ``pose``, from a frame number to a 4 x 4 matrix; both picklable."""
 
     name: str
     shape: Obstacle
@@ -67,8 +65,8 @@ class ContactLaw:
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
-    ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
+    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm]
+    from their ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)

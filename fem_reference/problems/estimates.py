@@ -194,9 +194,7 @@ def _taut(case: MuscleCase) -> float:
 
 
 def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
-    """The smallest and the greatest expected stretch of fibres: from the line between attachments, and from bending by as much as
-    the bones turn.
-    """
+    """The expected range of fibre stretch: from the line between attachments, and from bending as the bones turn."""
     if len(rest.attached) < 2:
         return 1.0, 1.0
     length, half = length_of(rest), thickness_of(rest) / 2

@@ -79,9 +79,7 @@ def _linear(kind: Kind, places: Floats) -> Floats:
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The values (q, k) of the nodes' polynomials, 1 at their node and 0 at all others, at ``places`` (q, 3) of the reference
-    cell.
-    """
+    """The nodes' polynomials (q, k), 1 at their own node and 0 at others, at ``places`` (q, 3) in the cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)
@@ -107,11 +105,8 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
     for side in sides:
         off = shares[:, every[:, None], np.setdiff1d(every, side)].any(axis=2)  # (8, c)
         parts.append([(part, other) for part in range(8) for other in sides if not off[part, list(other)].any()])
-    at = {
-        tuple(sorted(cell[k] for k in side)): (i, j)
-        for i, cell in enumerate(mesh.cells.tolist())
-        for j, side in enumerate(sides)
-    }
+    cells = enumerate(mesh.cells.tolist())
+    at = {tuple(sorted(cell[k] for k in side)): (i, j) for i, cell in cells for j, side in enumerate(sides)}
     found = {}
     for name, facets in mesh.facets.items():
         places = [at[tuple(sorted(facet))] for facet in facets.tolist()]

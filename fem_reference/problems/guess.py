@@ -131,9 +131,8 @@ def turn(rest: Setup, frame: float) -> float:
 
 def length_of(rest: Setup) -> float:
     """The length [mm] from the first attachment to the last, or of the whole muscle without two."""
-    middles = centres(rest)
-    extent = diagonal(rest.surface.points)
-    return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent
+    middles = centres(rest) or [np.zeros(3)]
+    return float(np.linalg.norm(middles[0] - middles[-1])) or diagonal(rest.surface.points)
 
 
 def thickness_of(rest: Setup) -> float:

@@ -102,9 +102,9 @@ class MuscleProblem(Setup):
 
     @cached_property
     def body(self) -> Body:
-        """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by springs at
-        ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where two bones prescribe
-        different motions, or one moves in a way that cannot be followed.
+        """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by
+        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where
+        two bones prescribe different motions, or one moves in a way that cannot be followed.
         """
         return _body_of(self)
 
@@ -167,7 +167,9 @@ def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """Spacing and errors [mm] of bones' distance grids; InputError where the bones and the surface do not allow contact."""
+    """Spacing and errors [mm] of bones' distance grids; InputError where the bones and the surface do not allow
+    contact.
+    """
     pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
     check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
     check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
@@ -181,9 +183,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def _filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher preserves it, else those
-    under it.
-    """
+    """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
@@ -230,8 +230,8 @@ def solid(bone: CaseBone) -> Obstacle | None:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the number of its
-    vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
+    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the
+    number of its vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {

@@ -2,8 +2,6 @@
 
 import logging
 from collections.abc import Callable
-from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -11,15 +9,11 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
-from fem_reference.foundations.records import Record
-from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.problems import muscle, scalar
-from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.problem import Problem
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.stresses import Watch
@@ -30,47 +24,9 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-class CaseSetup(Problem, Protocol):
-    """A case before meshing, with all that judging its runs needs: the ``Setup`` of a muscle, or the whole ``FieldProblem``."""
-
-    @property
-    def exact(self) -> str | None:
-        """The formula of the solution, where known."""
-
-    @property
-    def bones(self) -> tuple[Bone, ...]:
-        """The bones; a scalar field has none."""
-
-    @property
-    def exempt(self) -> Exemption | None:
-        """The part of the surface that is exempt from contact with bones, where there is a surface."""
-
-    @property
-    def body(self) -> Body | None:
-        """The finite element body of a muscle, once it is filled."""
-
-    @property
-    def field(self) -> FieldProblem | None:
-        """The scalar field, None for a muscle."""
-
-
-class CaseProblem(CaseSetup, Protocol):
-    """The problem of a case as a solver receives it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
-
-    @property
-    def effects(self) -> tuple[Record, ...]:
-        """The effects that act."""
-
-    @property
-    def mesh_facts(self) -> dict[str, float] | dict[str, float | str]:
-        """Size and quality of its mesh, by name."""
-
-    @property
-    def muscle(self) -> MuscleProblem | None:
-        """The muscle, None for a scalar field."""
-
-    def write_meshes(self, folder: Path, /) -> None:
-        """Write the mesh of the solution into ``folder``, for ParaView."""
+# A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
+CaseSetup = Setup | FieldProblem
+CaseProblem = MuscleProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
@@ -79,7 +35,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
     """
     if not isinstance(case, MuscleCase):
         return ()
-    known = muscle.setup(case) if rest is None else rest()
+    known = setup(case) if rest is None else rest()
     assert isinstance(known, Setup)  # of a muscle
     return decisions(case, known)
 
@@ -175,9 +131,7 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that the case omitted, in solved frames; None where it omitted none. ``rest`` is its set-up,
-    ``built`` gives its problem.
-    """
+    """The watch for effects that a case omitted, from its set-up and its problem; None where it omitted none."""
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle
@@ -203,10 +157,7 @@ def scalar_case(case: Case) -> ScalarCase:
 
 def setup(case: Case) -> CaseSetup:
     """The set-up of a case. InputError names what is unusable."""
-    if isinstance(case, MuscleCase):
-        return muscle.setup(case)
-    assert isinstance(case, ScalarCase)  # there are no other types
-    return scalar.build(case)
+    return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))
 
 
 def problem(case: Case, rest: CaseSetup) -> CaseProblem:

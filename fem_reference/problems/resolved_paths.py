@@ -1,12 +1,12 @@
-"""Stops of load steps between frames, so that none leaves out what happens within it, whatever the frames.
+"""Frame numbers at which load steps end, so that no step skips motion, whatever the frames.
 
-Between two stops nothing that is prescribed, and no bone, turns by more than a right angle, from half a turn on the straight
-line between two poses no longer shows the direction; nothing goes farther, apart from what all do alike, than the body is
-long; and nothing goes there and back, but for a fifteenth of that distance and a hundredth of the body's size.
+Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight
+line between two poses loses the direction), goes farther than the body is long, apart from the motion that all share,
+or goes there and back by more than a fifteenth of that distance and a hundredth of the body's size.
 
-Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``turning``), so
-that this holds whatever they are. Any other function of a frame number is sampled 1024 times over all frames, 16 times between
-two of them at least, and again between where it moves far: what it does within less is not seen.
+Motions and paths of this package state the frames at which they bend and the angles by which they turn between
+(``turning``), so that this holds for all of them. Any other function of a frame number is sampled 1024 times over all
+frames, at least 16 times between two of them, and again where it moves far: faster motion is not seen.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ class Moving:
 
 def turning(path: object, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
-    has turned by at each; None of one that says none.
+    has turned by at each; None where the path does not state them.
     """
     owner = getattr(path, "__self__", path)  # of a method
     if not type(owner).__module__.startswith("fem_reference."):
@@ -116,9 +116,8 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
     ends = np.unique(np.clip([first, *knots, last], first, last))
     turned = np.abs(np.diff(np.interp(ends, knots, angles))) if len(knots) else np.zeros(len(ends) - 1)
     if not turned.sum() < _MOST * _SAMPLED:
-        raise InputError(
-            f"{thing.place}: path", f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
-        )
+        got, want = f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
+        raise InputError(f"{thing.place}: path", got, want)
     counts = np.maximum(np.ceil(turned / _SAMPLED - 1e-9), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count + 1) for (a, b), count in zip(pairwise(ends), counts, strict=True)])
 
@@ -135,11 +134,9 @@ class _Samples:
             self.strides = [_steps(place) for place in self.places]
             bodies = [place for thing, place in zip(things, self.places, strict=True) if not thing.scale]
             alike = np.mean([place.mean(axis=1) for place in bodies], axis=0) if bodies else np.zeros((len(frames), 3))
-            self.apart = [
-                _steps(place if thing.scale else place - alike[:, None])
-                for thing, place in zip(things, self.places, strict=True)
-            ]
-            self.angles = [_turns(thing, frames, place) for thing, place in zip(things, self.places, strict=True)]
+            both = list(zip(things, self.places, strict=True))
+            self.apart = [_steps(place if thing.scale else place - alike[:, None]) for thing, place in both]
+            self.angles = [_turns(thing, frames, place) for thing, place in both]
             self.lengths, self.travels, self.turns = (
                 [np.concatenate([np.zeros_like(one[:1]), np.cumsum(one, axis=0)]) for one in steps]
                 for steps in (self.strides, self.apart, self.angles)

@@ -32,10 +32,10 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices,
-    then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
-    ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the greatest mesh Peclet number; ``exact`` the formula
-    of the solution where known.
+    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them
+    (the vertices, then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of
+    each cell above the mean y; ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the greatest
+    mesh Peclet number; ``exact`` the formula of the solution where known.
     """
 
     mesh: FieldMesh

@@ -11,7 +11,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
-from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.sectors import attached_shares
@@ -19,7 +19,7 @@ from fem_reference.geometry.signed_distance import cached
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import AtRest, Task
 
-# Up to here [mm] from a bone the distance to it is meant.
+# Distances to a bone are computed up to here [mm] from it.
 DISTANCE_MARGIN = 12.0
 
 
@@ -30,8 +30,9 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
-    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of
+    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its
+    vertices.
     """
 
     name: str
@@ -53,12 +54,14 @@ class Bone:
         """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
 
+    def distances(self, frame: float, points: Floats) -> Floats:
+        """Distance (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
+        return self.shape.sample(apply(np.linalg.inv(self.pose(frame)), points)).distance
+
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
-    (None) exactly.
-    """
+    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
 
     attachment: str
     bone: Bone

@@ -1,5 +1,5 @@
-"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and those that
-effects which a case left out would add.
+"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and
+those that effects which a case left out would add.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from fem_reference.effects import Effect, Energy, Prestrain, Ramped, State, elastic_state, total_energy
 from fem_reference.effects.contact import among
 from fem_reference.foundations.indicators import Estimates
-from fem_reference.foundations.jets import Jet, JetFunctions, variables
+from fem_reference.foundations.jets import JET_FUNCTIONS, Jet, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
 from fem_reference.problems.estimates import ROUNDING, STRESS_TOLERANCE, Decision, decision, solved
 from fem_reference.problems.guess import axis_of, rms
@@ -44,7 +44,7 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
         some = slice(start, start + AT_ONCE)
         jets = variables(F[some].reshape(-1, 9).T)
         along = None if fibre is None else list(fibre[some].T)
-        state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JetFunctions())
+        state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JET_FUNCTIONS)
         with np.errstate(all="ignore"):  # what is no number is needed
             found[some] = first_piola(acting, state, len(F[some])) @ np.swapaxes(F[some], 1, 2)
     return found
@@ -119,8 +119,9 @@ class WatchedFrame:
 class Watch:
     """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
 
-    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that act. While
-    a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the greatest there was.
+    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
+    act. While a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the
+    greatest there was.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

@@ -10,15 +10,15 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.mesh import Floats
+from fem_reference.io.texts import finite
 from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
 from fem_reference.report.gallery import Figure, Shot, ramp, ticks
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.report.words import number, title_of
-from fem_reference.runs.reached import seconds_per_frame
+from fem_reference.runs.store import seconds_per_frame
 
 MOST_CURVES = 8
 
@@ -154,10 +154,8 @@ def _moved(versions: Versions) -> Drawing | None:
 
 def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:
     """The frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing."""
-    current, found = versions.current, versions.place
-    if found is None or not current.candidate.has_surface:
-        return [], ""
-    return gallery.figures(setup, current.candidate.surface, _shots(versions, found[0]))
+    run, found = versions.current.candidate, versions.place
+    return gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:

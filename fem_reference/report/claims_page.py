@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
+from fem_reference.io.texts import finite
 from fem_reference.metrics import described
 from fem_reference.report.drawings import PALETTE, Drawing, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.report.words import words
 
 UNITS = {metric: one.unit for (metric, _), one in described("claim").items()}

@@ -4,28 +4,25 @@ from collections import Counter
 from functools import partial
 from typing import Any
 
-from fem_reference.assessment import reached
-from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.comparison import Comparison, reached, reached_frames
 from fem_reference.metrics import described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.drawings import colour_of
-from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.pages import Headlines, Page, template
 from fem_reference.report.sections import facts_of, sections
 from fem_reference.report.sections.origin import changes
 from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, known, summary
-from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
-from fem_reference.runs.reached import seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, seconds_per_frame
 
 
 def page(comparison: Comparison) -> Page:
     """The page of a comparison; of a reference that failed, over the frames that it reached."""
     numbers, failed = summary(comparison), _failed(comparison)
-    nothing, comparison = not len(reached.frames(comparison.reference)), reached.cut(comparison)
+    nothing, comparison = not len(reached_frames(comparison.reference)), reached(comparison)
     shared, said = _shared(comparison), headlines(comparison)
     shown = [
         template(f"sections/{name}.html").render(shared | facts_of(name, comparison))
@@ -49,7 +46,7 @@ def _failed(comparison: Comparison) -> str:
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
-    kept = reached.frames(reference)
+    kept = reached_frames(reference)
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
         return f"{why} No frame was reached, so that nothing could be measured against it."
@@ -82,6 +79,8 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "error": error and error.worst,
         "viewer": view(comparison),
         "colours": gallery.ramp(),
+        "ticks": gallery.ticks,
+        "pictures": gallery.of_comparison,
         "find": find,
         "ratio": ratio,
         "label_of": label_of,

@@ -50,15 +50,13 @@ def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) ->
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
-    """The ends of the axis [mm] that the drawings of all candidates' surfaces share, and whether it is logarithmic, as it is where
-    one is so much further away than another that its curve would lie on the frame.
-    """
-    wanted = {("surface_deviation", statistic) for statistic, _, _ in _STATISTICS}
-    each = [
-        np.concatenate([one.values for one in measures if (one.metric, one.statistic) in wanted] or [np.zeros(0)])
-        for measures in comparison.deviations.values()
-    ]
-    tops = [float(values[np.isfinite(values)].max()) for values in each if np.isfinite(values).any()]
+    """The ends of the axis [mm] that the surfaces of all candidates share, and whether it is logarithmic: if they differ much."""
+    wanted = [("surface_deviation", statistic) for statistic, _, _ in _STATISTICS]
+    tops = []
+    for measures in comparison.deviations.values():
+        values = np.hstack([one.values for one in measures if (one.metric, one.statistic) in wanted] or [np.zeros(0)])
+        if np.isfinite(values).any():
+            tops.append(float(values[np.isfinite(values)].max()))
     top, apart = max(tops, default=0.0), [one for one in tops if one > 0]
     far = bool(apart) and top > _FAR * min(apart)
     return (min(apart) / 1e3 if far else 0.0), (1.3 if far else 1.04) * (top or 1.0), far

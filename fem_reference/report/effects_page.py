@@ -7,21 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment import omissions
-from fem_reference.assessment.fronts import COSTS
-from fem_reference.assessment.omissions import (
-    COUNTS,
-    MEASURES,
-    PHASES,
-    Ablation,
-    CaseOmissions,
-    Omission,
-    in_bars,
-    verdict,
-)
+from fem_reference.assessment.omissions import Ablation, CaseOmissions, Omission
 from fem_reference.metrics import described
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
 from fem_reference.report.pages import Page
-from fem_reference.report.words import duration, listed, number, title_of, words
+from fem_reference.report.study_page import title_of
+from fem_reference.report.words import duration, listed, number, words
 
 MAIN = "surface_deviation.rms"
 # By name the head of a column of the table.
@@ -34,14 +25,14 @@ def page(found: CaseOmissions) -> Page:
     """The page of the omissions of a case."""
     contents = {
         "found": found,
-        "measures": [name for name in MEASURES if name in found.units],
+        "measures": [name for name in omissions.MEASURES if name in found.units],
         "heads": HEADS,
         "phases": phases(found),
-        "counts": {name: count_title(name) for name in COUNTS},
+        "counts": {name: title_of(name) for name in omissions.COUNTS},
         "predicted": any(one.predicted for ablation in found.ablations for one in ablation.omissions),
         "sentences": sentences,
         "label": label,
-        "judged": lambda one: verdict(one.changes, found.bars),
+        "judged": lambda one: omissions.verdict(one.changes, found.bars),
         "prediction": lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
         "instead": lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
         "percent": percent,
@@ -49,15 +40,6 @@ def page(found: CaseOmissions) -> Page:
     }
     title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
     return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))
-
-
-def count_title(name: str) -> str:
-    """The name of a count in words.
-
-    >>> count_title("newton_iterations"), count_title("load_steps")
-    ('Newton iterations', 'load steps')
-    """
-    return COSTS[name][0] if name in COSTS else words(name)
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
@@ -81,7 +63,7 @@ def percent(share: float) -> str:
 def phases(found: CaseOmissions) -> list[str]:
     """The phases that a run of the case knows apart and spends time on."""
     runs = [one for ablation in found.ablations for one in (ablation.whole, *ablation.omissions)]
-    return [name for name in PHASES if any(one.phase(name) > 0 for one in runs)]
+    return [name for name in omissions.PHASES if any(one.phase(name) > 0 for one in runs)]
 
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
@@ -106,7 +88,7 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
         "hardly": "It hardly matters",
         "does not matter": "It does not matter",
         "not known": "Whether it matters is not known",
-    }[verdict(one.changes, found.bars)]
+    }[omissions.verdict(one.changes, found.bars)]
     saved = 1 - ablation.relative(one.seconds)
     time = "" if math.isnan(saved) else f" and {'saves' if saved >= 0 else 'costs'} {percent(abs(saved))} of the time"
     return f"Leaving out {name} changes {_most(found, one)}{time}. {said}."
@@ -114,7 +96,9 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
 
 def _most(found: CaseOmissions, one: Omission) -> str:
     """The change that is the most error bars."""
-    ratios = {name: ratio for name, ratio in in_bars(one.changes, found.bars).items() if not math.isnan(ratio)}
+    ratios = {
+        name: ratio for name, ratio in omissions.in_bars(one.changes, found.bars).items() if not math.isnan(ratio)
+    }
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
     known = f", known to {number(found.bars[name])} {found.units[name]}," if name in found.bars else ""
     return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
@@ -172,7 +156,7 @@ def text(found: CaseOmissions) -> str:
     lines = [f"{found.case}: {'known to: ' + ', '.join(known) if known else 'no error bars: ' + found.unknown}"]
     for ablation in found.ablations:
         whole = ablation.whole
-        counts = [f"{number(whole.costs[name])} {count_title(name)}" for name in COUNTS if name in whole.costs]
+        counts = [f"{number(whole.costs[name])} {title_of(name)}" for name in omissions.COUNTS if name in whole.costs]
         time = duration(None if math.isnan(whole.seconds) else whole.seconds)
         lines.append(f"  {', '.join([f'{ablation.name}: {whole.status}', f'{time} of processor time', *counts])}")
         lines += [f"    {sentence}" for sentence in sentences(found, ablation)]

@@ -15,10 +15,9 @@ from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.local_fields import to_same_vertex
-from fem_reference.foundations import scratch
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
-from fem_reference.foundations.subprocesses import command, environment
+from fem_reference.foundations.subprocesses import command, environment, scratch_folder
 from fem_reference.metrics import at_rest, find
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import pictures
@@ -68,6 +67,11 @@ def shots(comparison: Comparison) -> list[Shot]:
     return chosen + [shot for run in comparison.candidates for shot in _worst(comparison, run)]
 
 
+def of_comparison(comparison: Comparison) -> tuple[list[Figure], str]:
+    """The figures of the runs of a comparison, each at its worst frame, or none and what is missing."""
+    return figures(comparison.setup, comparison.reference.surface, shots(comparison))
+
+
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Figure], str]:
     """The figures of ``wanted``, or none and what is missing."""
     try:
@@ -84,7 +88,7 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Fi
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
     """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
-    with scratch.folder() as folder:
+    with scratch_folder() as folder:
         job = folder / "job.npz"
         np.savez(job, top=top(wanted), **_job(setup, surface, wanted))
         _run(program(job, folder))

@@ -40,9 +40,7 @@ def _what(expected: Expectation) -> str:
 
 def comparison_text(result: Comparison, page: Path | None = None) -> str:
     """The result of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
-    runs = [
-        f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
-    ]
+    runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in result.runs]
     runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
     checks = second_check.texts_of(result.reference)
     if checks and result.reference.outcome.status == "converged":
@@ -50,11 +48,9 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}
-    verdict = f"verdict: {result.word}" + (
-        ", of the reference; candidates are measured, not judged" if unjudged else ""
-    )
+    note = ", of the reference; candidates are measured, not judged" if unjudged else ""
     written = [] if page is None else [f"page: {page}"]
-    return "\n".join([*runs, *_known(result), *_worst(result), *judged, verdict, *written])
+    return "\n".join([*runs, *_known(result), *_worst(result), *judged, f"verdict: {result.word}{note}", *written])
 
 
 def _judged(verdict: Verdict) -> str:
@@ -80,9 +76,7 @@ def _number(value: float) -> str:
 
 
 def _worst(result: Comparison) -> list[str]:
-    """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table; of fields, which have
-    a single number each, all of them.
-    """
+    """The worst deviations of each candidate in a line, in the statistics of the page's first table; of fields, all numbers."""
     if "field" in result.reference.carries:
         measured = {"reference": result.changes["reference"]} | result.deviations
         return [line for name, measures in measured.items() for line in _measured(name, measures)]

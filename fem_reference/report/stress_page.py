@@ -15,29 +15,16 @@ _MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "refused": "\N{EN DASH}
 _SIDE, _OVERSAMPLING = 220, 2
 # The camera looks along this direction, from in front, above and to the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
-_PAPER, _LIT, _DARK, _BACK, _EDGE, _MARK = (
-    "#ffffff",
-    (205, 120, 110),
-    (120, 55, 48),
-    (90, 130, 190),
-    (60, 30, 26),
-    "#1f4fd8",
-)
+_PAPER, _MARK = "#ffffff", "#1f4fd8"
+_LIT, _DARK, _BACK, _EDGE = (205, 120, 110), (120, 55, 48), (90, 130, 190), (60, 30, 26)
 _LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # of the axes in a drawing of 300 by 150
 
 
 def page(found: Stress) -> Page:
     """The page of hard cases."""
-    contents = {
-        "stress": found,
-        "verdicts": VERDICTS,
-        "marks": _MARKS,
-        "summary": summary(found),
-        "picture": picture,
-        "history": history,
-    }
-    said = (("", "", summary(found)),)
-    return Page("hard cases", "Hard cases", said, "stress_page.html", contents, stress.facts(found))
+    said, drawn = summary(found), {"picture": picture, "history": history}
+    contents = {"stress": found, "verdicts": VERDICTS, "marks": _MARKS, "summary": said} | drawn
+    return Page("hard cases", "Hard cases", (("", "", said),), "stress_page.html", contents, stress.facts(found))
 
 
 def summary(found: Stress) -> str:
@@ -59,9 +46,7 @@ def text(found: Stress) -> str:
 
 
 def picture(scene: Scene) -> str:
-    """The body as an image for a page: triangles lit from the camera, blue where one sees their inner side, and a ring around the
-    place.
-    """
+    """The body as an image: triangles lit from the camera, blue where their inner side is seen, and a ring around the place."""
     forward = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)

@@ -8,21 +8,10 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fem_reference.assessment import cost_study
+from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import (
-    COSTS,
-    Match,
-    Point,
-    Price,
-    at_same_cost,
-    at_same_error,
-    levels,
-    pareto,
-    price,
-    solvers,
-)
+from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, solvers
 from fem_reference.assessment.transfer import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
@@ -51,7 +40,7 @@ def page(study: Study) -> Page:
         "main": MAIN,
         "costs": COSTS,
         "solvers": solvers,
-        "fronts": fronts,
+        "fronts": front_drawings,
         "sentences": sentences,
         "matched": matched,
         "left_out": left_out,
@@ -81,7 +70,7 @@ def title_of(name: str) -> str:
 def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     """The price of accuracy on a case, in sentences."""
     unit, points = case.units[error], case.counted
-    prices = {solver: found for solver in solvers(points) if (found := price(points, solver, error, TIME))}
+    prices = {solver: found for solver in solvers(points) if (found := fronts.price(points, solver, error, TIME))}
     said = [_sentence(one, unit, case.bars.get(error, 0.0)) for one in prices.values()]
     others = {solver: one.best for solver, one in prices.items() if solver != REFERENCE}
     if REFERENCE in prices and others:
@@ -108,11 +97,15 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
     """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
     points = case.counted
     tables = [
-        (cost, error, [at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)])
+        (
+            cost,
+            error,
+            [fronts.at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)],
+        )
         for cost in MATCHED
     ]
     certain = case.certain  # what "at most" means of an error here is what it means to the verb recommend
-    rows = [at_same_error(certain, error, TIME, at) for at in levels(certain, error, TIME, of_error=True)]
+    rows = [fronts.at_same_error(certain, error, TIME, at) for at in levels(certain, error, TIME, of_error=True)]
     return [*tables, (error, TIME, rows)]
 
 
@@ -126,7 +119,7 @@ def left_out(case: CaseStudy) -> list[Point]:
     return [point for point in case.points if point.status != "converged"]
 
 
-def fronts(case: CaseStudy) -> list[Drawing]:
+def front_drawings(case: CaseStudy) -> list[Drawing]:
     """Error against time, a drawing for each of the statistics shown."""
     return [_front(case, error) for error in SHOWN]
 
@@ -163,7 +156,7 @@ def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver:
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return
-    best = pareto((counted for _, counted in points), error, TIME)
+    best = fronts.pareto((counted for _, counted in points), error, TIME)
     _plot(axes, [pair for _, pair in pairs], ".", color=colour, markersize=5, label=solver)
     _plot(axes, [pair for point in best if (pair := point.at(error, TIME))], "-", color=colour, linewidth=1.2)
     rings = [pair for point, pair in pairs if point.is_default]

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -10,6 +9,7 @@ from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Alone, Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
+from fem_reference.io.texts import finite
 from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
@@ -73,15 +73,6 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def finite(value: float) -> float | None:
-    """``value``, or None where it is not finite.
-
-    >>> finite(2), finite(float("nan"))
-    (2.0, None)
-    """
-    return float(value) if math.isfinite(value) else None
-
-
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
     """The error bars of the reference, none without any."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
@@ -121,16 +112,9 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
     expectation = verdict.expectation
     return {
         "verdict": verdict.word,
-        "of": expectation.of,
-        "metric": expectation.metric,
-        "statistic": expectation.statistic,
+        **{name: getattr(expectation, name) for name in ("of", "metric", "statistic", "kind", "because")},
+        **{name: getattr(verdict, name) for name in ("frame", "truth", "within", "unit")},
         "expected_at": expectation.frame,
-        "frame": verdict.frame,
         "value": finite(verdict.value),
-        "truth": verdict.truth,
-        "within": verdict.within,
-        "unit": verdict.unit,
         "error_bar": None if verdict.error_bar is None else finite(verdict.error_bar),
-        "kind": expectation.kind,
-        "because": expectation.because,
     }

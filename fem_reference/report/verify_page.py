@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment.catalogue import Result, Verification
+from fem_reference.io.texts import finite
 from fem_reference.report import verify_figures
 from fem_reference.report.pages import Page
-from fem_reference.report.tables import finite
 from fem_reference.report.words import duration
 
+_OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 
 
@@ -66,20 +67,14 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
     """Each result with its entry as names, numbers and sentences."""
     return [
         {
-            **{name: getattr(one.entry, name) for name in ("name", "group", "title", "unit", "kind")},
+            **{name: getattr(one.entry, name) for name in _OF_ENTRY},
             "verdict": one.word,
             "value": finite(one.finding.value),
-            "truth": finite(one.truth),
-            "error": finite(one.error),
-            "within": finite(one.within),
-            "relative": one.entry.relative,
+            **{name: finite(getattr(one, name)) for name in ("truth", "error", "within")},
             "order": None if one.finding.order is None else finite(one.finding.order),
             "ladder": [[finite(size), finite(value)] for size, value in one.finding.ladder],
             "seconds": one.seconds,
-            "because": one.entry.because,
-            "source": one.entry.source,
             "note": one.finding.note,
-            "negative_control": one.entry.negative_control,
             "with_negative_control": one.with_negative_control,
         }
         for one in results

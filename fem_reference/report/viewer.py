@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
-from fem_reference.geometry.thinning import thin
+from fem_reference.geometry.coarsening import thin
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
 from fem_reference.report.viewer_fields import Fields, joints

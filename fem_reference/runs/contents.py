@@ -68,11 +68,13 @@ class Contents(Record):
 
 
 def frame_file(number: float, suffix: str) -> str:
-    """The name of a file of the frame of a ``number``.
+    """The name of a file of the frame of a ``number``; ValueError where that is not whole, as two frames would share a file.
 
     >>> frame_file(10, ".vtp")
     'frame_0010.vtp'
     """
+    if number % 1:
+        raise ValueError(f"frame {number:g}, which is no whole number, has no file")
     return f"frame_{number:04.0f}{suffix}"
 
 

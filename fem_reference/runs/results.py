@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.jets import JetFunctions, variables
+from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
@@ -59,14 +59,14 @@ class Results:
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
         """Results by name at ``points`` (n, 3) [mm] of the rest state, at a frame number of ``frames``.
 
-        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
-        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume
-        grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and
-        ``fibre_stress`` (n,) [MPa], the stress along the present fibre direction. InputError where the run has no such frame or
-        result.
+        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3,
+        3), ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where
+        the volume grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,)
+        [MPa]; and ``fibre_stress`` (n,) [MPa], the stress along the present fibre direction. InputError where the run
+        has no such frame or result.
 
-        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: at a shared point they are
-        those of one tetrahedron. Where det F is not positive the stress is NaN.
+        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: at a shared point
+        they are those of one tetrahedron. Where det F is not positive the stress is NaN.
         """
         wanted = self._checked(names, self._state(frame))
         found = np.asarray(points, float)
@@ -84,7 +84,9 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in the tetrahedra ``tets`` (n,)."""
+        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in the tetrahedra ``tets``
+        (n,).
+        """
         state = self._state(frame)
         wanted = self._checked(names, state)
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -126,8 +128,8 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes that it was
-    solved with. InputError where there is no run with states, or it is of another case.
+    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes
+    that it was solved with. InputError where there is no run with states, or it is of another case.
     """
     folder = Path(folder)
     run = store.load(folder)
@@ -206,7 +208,7 @@ class _Places:
             before=list(before.T),
             F_before=[list(row) for row in np.moveaxis(F_before, 0, -1)],
             rate=state.rate,
-            functions=JetFunctions(),
+            functions=JET_FUNCTIONS,
         )
 
 
@@ -218,11 +220,11 @@ def von_mises(stress: Floats) -> Floats:
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
     """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates L (n, 4), and their gradients
-    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the order of
-    ``body.reference_nodes``.
+    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the
+    order of ``body.reference_nodes``.
 
-    Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite Element Method,
-    vol. 1, 8.12).
+    Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite
+    Element Method, vol. 1, 8.12).
     """
     if count == 4:
         return barycentric, gradients

@@ -1,7 +1,9 @@
-"""The finite element states of a run: the unknowns of every tetrahedron, written and read with numpy alone.
+"""The finite element states of a run, and its scalar fields: arrays by frame, written and read with numpy alone.
 
 <run>/state/rest.npz          points (n, 3) [mm], tets (m, 4), fibre (m, 3): the unit vector along the fibres, (0, 3) if none
             /frame_0010.npz   the arrays of ``NodalState``
+     /field/frame_0000.vtu    a scalar field at the vertices, for ParaView
+            /frame_0000.npz   the arrays of ``NodalField``, with its mesh
 """
 
 import zipfile
@@ -15,10 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh
-from fem_reference.io.files import whole
+from fem_reference.geometry.field_mesh import FieldMesh
+from fem_reference.io import files
 from fem_reference.runs.contents import frame_file
 
-FOLDER = "state"
+FOLDER, FIELD = "state", "field"
+VALUES = "psi"  # the name of a field itself
 # The most memory [bytes] for the arrays of a file: a state of a million tetrahedra.
 MOST_BYTES = 2**30
 # Arrays by name.
@@ -54,7 +58,9 @@ class NodalState:
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """Write the rest ``mesh`` of the states of the run in ``folder``, and the unit vectors ``fibre`` (m, 3) in its tetrahedra."""
+    """Write the rest ``mesh`` of the states of the run in ``folder``, and the unit vectors ``fibre`` (m, 3) in its
+    tetrahedra.
+    """
     directions = np.zeros((0, 3)) if fibre is None else fibre
     write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
@@ -118,7 +124,7 @@ def _place(folder: Path, frame: float) -> Path:
 def write_arrays(path: Path, arrays: Arrays) -> None:
     """Write arrays by name into an .npz file."""
     path.parent.mkdir(exist_ok=True)
-    with whole(path) as part:
+    with files.whole(path) as part:
         np.savez(part, allow_pickle=False, **arrays)
 
 
@@ -135,3 +141,61 @@ def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
                 return {name: arrays[name] for name in names or arrays.files}
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
         raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error
+
+
+@dataclass(frozen=True, eq=False)
+class NodalField:
+    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the middles of
+    ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, where a solver computes one.
+    ``form``: the weak form that was solved. After a failure psi is not-a-number.
+    """
+
+    mesh: FieldMesh
+    arrays: dict[str, Floats]
+    form: str
+
+
+def write_field(path: Path, field: NodalField) -> None:
+    """Write a field: the values of all nodes as an array, and the vertices into ``path``, a .vtu file for ParaView."""
+    mesh = field.mesh
+    write_arrays(path.with_suffix(".npz"), {"points": mesh.points, "cells": mesh.cells} | field.arrays)
+    shown = {name: values[: len(mesh.points)] for name, values in field.arrays.items()}
+    files.write_field(path, mesh.points, mesh.cells, shown)
+
+
+def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, Floats]]:
+    """The mesh, and by name the arrays (f, ...) of the frames, of the run in ``folder``; InputError where a file is damaged."""
+    frames = []
+    for number in numbers:
+        path = folder / FIELD / frame_file(number, ".npz")
+        frames.append(read_arrays(path))
+        if not {"points", "cells", VALUES} <= frames[-1].keys():
+            raise InputError(path, ", ".join(frames[-1]), f"the arrays points, cells and {VALUES}")
+        _check_field(frames[-1], frames[0], path)
+    names = [name for name in frames[0] if name not in ("points", "cells")]
+    mesh = FieldMesh(frames[0]["points"], frames[0]["cells"], str(folder))
+    return mesh, {name: np.stack([frame[name] for frame in frames]) for name in names}
+
+
+def _check_field(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> None:
+    """Raise InputError where a frame's arrays are not those of a field, or belong to another mesh than the ``first``."""
+    points, cells, values = arrays["points"], arrays["cells"], arrays[VALUES]
+    found = {name: (array.shape, array.dtype.kind) for name, array in arrays.items()}
+    usable = (
+        all(kind in "fiu" for _, kind in found.values())
+        and points.ndim == cells.ndim == 2
+        and points.shape[1] in (1, 2, 3)
+        and cells.shape[1] in (2, 3)
+        and cells.dtype.kind == "i"
+        and cells.size > 0
+        and cells.min() >= 0
+        and cells.max() < len(points)
+        and values.ndim == 1
+    )
+    if not usable or found != {name: (array.shape, array.dtype.kind) for name, array in first.items()}:
+        got = ", ".join(f"{name} {shape} of {kind}" for name, (shape, kind) in found.items())
+        want = f"points (n, d), cells (m, 2 or 3) and {VALUES} of one mesh, as in the other frames"
+        raise InputError(path, got, want)
+    nodes = {len(points), len(points) + len(FieldMesh(points, cells).edges)}
+    if len(values) not in nodes or any(len(array) < len(points) for name, array in arrays.items() if name != "cells"):
+        raise InputError(path, f"{len(values)} values", f"{' or '.join(map(str, sorted(nodes)))}, one a node")

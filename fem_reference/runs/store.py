@@ -1,20 +1,17 @@
 """Runs: the result of a solver on a problem, in memory and on disk.
 
-        <store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
-                              /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
-                              /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
-                              /fibres.pvd      fibre polylines, where the solver has an interior
-                              /tets.pvd        tetrahedra, where the solver has them
-                              /field.pvd       a scalar field on its mesh, for a scalar problem (``fields``)
-                              /state/          the unknowns of the tetrahedra, where requested (``states``)
-                              /restart/        of an unfinished run: the state from which its solver continues (``cut_off``)
-
-Files are written atomically; ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
-crashed; it is not read as a result, and continues where its solver can.
+<store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
+                      /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                      /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
+                      /fibres.pvd      fibre polylines, where the solver has an interior
+                      /tets.pvd        tetrahedra, where the solver has them
+                      /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
+                      /state/          the unknowns of the tetrahedra, where requested (``states``)
+                      /restart/        of an unfinished run: the state from which its solver continues (``writer``)
 """
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +26,8 @@ from fem_reference.io import files, texts
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import fields
 from fem_reference.runs.contents import Contents, Status, frame_file
-from fem_reference.runs.fields import NodalField
-from fem_reference.runs.states import NodalState
+from fem_reference.runs.states import FIELD, VALUES, NodalField, NodalState, read_field
 from fem_reference.scenes.case import Part
 
 
@@ -70,11 +65,9 @@ class Frame:
 
     @classmethod
     def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
-        """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if any, as in
-        :class:`NodalField`.
-        """
+        """The frame of a field solved in a weak ``form``, with ``values`` and ``components`` as :class:`NodalField`."""
         more = {} if components is None else {"components": components}
-        return cls(problem.frames[0], field=NodalField(problem.mesh, {fields.VALUES: values} | more, form))
+        return cls(problem.frames[0], field=NodalField(problem.mesh, {VALUES: values} | more, form))
 
 
 Sink = Callable[[Frame], None]
@@ -144,7 +137,7 @@ class Run:
     @property
     def values(self) -> Floats:
         """The scalar field at all nodes (f, N); KeyError for a run without one."""
-        return self.fields[fields.VALUES]
+        return self.fields[VALUES]
 
     @property
     def vertex_values(self) -> Floats:
@@ -174,10 +167,8 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
         found = [getattr(state, name) for state in states]
         return np.stack(found) if found and all(one is not None for one in found) else None
 
-    positions, of_case = (
-        stacked("surface"),
-        all(state.surface is not None or state.field is not None for state in states),
-    )
+    positions = stacked("surface")
+    of_case = all(state.surface is not None or state.field is not None for state in states)
     names = set.intersection(*(set(state.scalars) for state in states)) if states else set()
     nodal = [state.field for state in states if state.field is not None]
     return Run(
@@ -204,14 +195,14 @@ def load(folder: Path) -> Run:
     if isinstance(state, dict) and state.get("status") == "running":
         raise InputError(f"{place}: status", '"running"', "a run that came to its end")
     stored = parse(Contents, state, f"{place}: run")
-    whose: dict[str, Any] = {"name": stored.name, "solver": stored.solver, "numbers": stored.numbers, "folder": folder}
-    whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
+    outcome = Outcome(stored.status, stored.message, stored.cost)
     scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}
-    whose |= {"scalars": scalars, "residuals": stored.residuals}
-    if fields.FOLDER in stored.parts:
-        mesh, arrays = fields.read(folder, stored.numbers)
-        return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)
-    return Run(**whose, **_moved(folder, stored.numbers, stored.parts))
+    run = Run(stored.name, stored.solver, outcome, stored.numbers, scalars=scalars, residuals=stored.residuals)
+    run = replace(run, folder=folder, origin=state["origin"])
+    if FIELD in stored.parts:
+        mesh, arrays = read_field(folder, stored.numbers)
+        return replace(run, has_surface=False, mesh=mesh, fields=arrays)
+    return replace(run, **_moved(folder, stored.numbers, stored.parts))
 
 
 def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:
@@ -257,3 +248,45 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
     except InputError:
         return None
     return run if run.outcome.status in ended else None
+
+
+def complete(run: Run, numbers: tuple[int, ...]) -> Run:
+    """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
+    if run.numbers == numbers:
+        return run
+    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
+
+    def pick(values: Floats) -> Floats:
+        blank = np.full(values.shape[1:], np.nan)
+        return np.stack([blank if row is None else values[row] for row in rows])
+
+    return replace(
+        run,
+        numbers=numbers,
+        positions=pick(run.positions),
+        fibre_positions=None if run.fibre_positions is None else pick(run.fibre_positions),
+        scalars={name: pick(values) for name, values in run.scalars.items()},
+        fields={name: pick(values) for name, values in run.fields.items()},
+    )
+
+
+def seconds_per_frame(run: Run) -> float | None:
+    """Time [s] to solve one reached frame after the first; None where the run was computed elsewhere and no time is given.
+
+    ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
+    """
+    cost = run.outcome.cost
+    seconds = cost.get("seconds_solve", cost.get("seconds"))
+    solved = reached(run) - 1
+    if run.solver == "recorded":
+        each = cost.get("seconds_per_frame")  # per frame number
+        return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
+    if seconds is None or solved < 1:
+        return None
+    return seconds / solved
+
+
+def reached(run: Run) -> int:
+    """The number of frames with positions of the surface, or of the fibres where there is no surface."""
+    positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
+    return int(np.isfinite(positions).all(axis=(1, 2)).sum())

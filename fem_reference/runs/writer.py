@@ -8,17 +8,86 @@ import json
 import logging
 import math
 import shutil
+import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fem_reference.io import files
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import parse
+from fem_reference.io import files, texts
 from fem_reference.problems.problem import NOTHING, AtRest
-from fem_reference.runs import cut_off, fields, states
-from fem_reference.runs.contents import FORMAT, RunJson, frame_file
-from fem_reference.runs.cut_off import CutOff
+from fem_reference.runs import states
+from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
+
+RESTART = "restart"
+# Killed with the process that stores it, or alone, for example for lack of memory or disk space.
+ENDED_EARLY = ("running", "crashed")
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """The kept part of a run: the ``numbers`` of its frames, and the ``folder`` for its solver until it ends."""
+
+    folder: Path
+    numbers: tuple[int, ...]
+
+
+def stored_before(folder: Path, identity: RunJson) -> RunJson | None:
+    """The run.json of a run in ``folder`` that was cut off and can continue as the one of ``identity``, if there is one."""
+    place = folder / "run.json"
+    with suppress(InputError):
+        state = texts.read_json(place, "a run")
+        if not isinstance(state, dict) or state.get("status") not in ENDED_EARLY or not state.get("numbers"):
+            return None
+        if not (folder / RESTART).is_dir():
+            return None
+        whole = parse(Contents, state | {"status": "crashed"}, f"{place}: run")
+        wanted = json.loads(json.dumps(identity))
+        same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
+        if wanted["origin"].get("settings", {}).get("store_state") and "state" not in whole.parts:
+            return None  # its frames lack requested parts
+        if same and whole.origin.versions == wanted["origin"].get("versions", {}):
+            for part in folder.rglob(".*"):  # incomplete files
+                part.unlink()
+            return state | {"status": "running", "message": "", "cost": {}}
+    return None
+
+
+def truncate(state: RunJson, number: float) -> None:
+    """Remove the frames from ``number`` on, which are solved again, from a ``state`` as in run.json."""
+    kept = sum(stored < number for stored in state["numbers"])
+    state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]
+    state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
+
+
+def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
+    """Positions [mm] of the surface (n, 3) and of the tets' points (k, 3), if any, in a stored frame of a run."""
+    tets = folder / "tets" / frame_file(number, ".vtu")
+    surface = files.read_surface(folder / "surface" / frame_file(number, ".vtp"), 1.0).points
+    return surface, files.read_points(tets) if tets.is_file() else None
+
+
+def pass_on(folder: Path, to: Path) -> None:
+    """Let the run of the folder ``to`` continue from the kept part of the stopped one in ``folder``, unless it has its own."""
+    if (folder / RESTART).is_dir() and not to.exists():
+        with tempfile.TemporaryDirectory(dir=to.parent) as new:
+            copy = shutil.copytree(folder, Path(new) / to.name)
+            state = texts.read_json(copy / "run.json", "a run")
+            (copy / "run.json").write_text(json.dumps(state | {"status": "running"}), encoding="utf-8")
+            copy.rename(to)
+    clear(folder)
+
+
+def clear(folder: Path) -> None:
+    """Remove the restart files of a finished run from its ``folder``."""
+    shutil.rmtree(folder / RESTART, ignore_errors=True)
+
 
 log = logging.getLogger(__name__)
 
@@ -32,15 +101,13 @@ class Writer:
     """
 
     def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING) -> None:
-        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the requested numbers), as in run.json; ``rest``: the
-        shapes that its frames move.
-        """
+        """Begin a run of an ``identity``: name, solver, origin and requested frames, as in run.json."""
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
-        if (stored := cut_off.stored(folder, identity)) is not None:
-            self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
+        if (kept := stored_before(folder, identity)) is not None:
+            self.state = kept | {"name": identity["name"], "origin": identity["origin"]}
             return
         shutil.rmtree(folder) if folder.exists() else None
         files.make_folder(folder)
@@ -49,7 +116,7 @@ class Writer:
     @property
     def cut_off(self) -> CutOff:
         """The stored part, for a solver that can continue."""
-        return CutOff(self.folder / cut_off.FOLDER, self.frames)
+        return CutOff(self.folder / RESTART, self.frames)
 
     @property
     def frames(self) -> tuple[int, ...]:
@@ -58,7 +125,7 @@ class Writer:
 
     def add(self, frame: Frame) -> None:
         """Store a frame: its files first, then the index files and run.json."""
-        cut_off.truncate(self.state, frame.number)
+        truncate(self.state, frame.number)
         parts: dict[str, Callable[[Path], None]] = {}
         surface, lines, mesh = self.rest.surface, self.rest.fibres, self.rest.mesh
         if (positions := frame.surface) is not None:
@@ -71,13 +138,13 @@ class Writer:
             parts["tets"] = lambda path: files.write_tets(path, mesh, frame.points)
         stored = ["state"] if self._write_unknowns(frame) else []
         if (solved := frame.field) is not None:
-            parts[fields.FOLDER] = lambda path: fields.write(path, solved)
+            parts[states.FIELD] = lambda path: states.write_field(path, solved)
             self.state["origin"]["form"] = solved.form
         self.state["numbers"].append(frame.number)
         self.state["residuals"].append(frame.residuals)
         self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
-            suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
+            suffix = ".vtu" if part in ("tets", states.FIELD) else ".vtp"
             (self.folder / part).mkdir(exist_ok=True)
             names = [(number, f"{part}/{frame_file(number, suffix)}") for number in self.state["numbers"]]
             write(self.folder / names[-1][1])
@@ -94,8 +161,8 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
-        if outcome.status not in (*cut_off.ENDED_EARLY, "stopped"):
-            cut_off.clear(self.folder)
+        if outcome.status not in (*ENDED_EARLY, "stopped"):
+            clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
         """The unknowns of the tets, if the frame has them."""

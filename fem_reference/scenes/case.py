@@ -27,9 +27,9 @@ DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
 
-# What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
+# Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
 Standard = Literal["reference", "exact", "itself"]
-# What a run has that can be measured.
+# Parts of a run that can be measured.
 Part = Literal["surface", "lines", "field"]
 
 
@@ -186,9 +186,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Causes of verdicts: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
-        the settings that change their answer.
-        """
+        """Causes of verdicts: what determines solutions, and the judged solvers with the settings that matter."""
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [

@@ -16,7 +16,7 @@ from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
 from fem_reference.io import texts
-from fem_reference.scenes.case import HOME, Case, NegativeControl
+from fem_reference.scenes.case import HOME, Case
 from fem_reference.scenes.muscle import Frames, MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
 
@@ -77,11 +77,8 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
             inside[last]  # a change replaces what is there
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
-        raise InputError(
-            join(place, key),
-            "nothing",
-            f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}",
-        ) from error
+        want = f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}"
+        raise InputError(join(place, key), "nothing", want) from error
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
@@ -90,14 +87,14 @@ def _near(table: dict[str, Any], parts: list[str | int]) -> str:
     part: Any
     for i, part in enumerate(parts):
         if isinstance(inside, list) and not (isinstance(part, int) and part < len(inside)):
-            names = [f" ({one['name']})" if isinstance(one, dict) and "name" in one else "" for one in inside]
+            key, names = ".".join(map(str, parts[:i])), [isinstance(one, dict) and one.get("name") for one in inside]
             return "; there are " + ", ".join(
-                f"{'.'.join(map(str, parts[:i]))}[{k}]{name}" for k, name in enumerate(names)
+                f"{key}[{k}]{f' ({name})' if name else ''}" for k, name in enumerate(names)
             )
         if isinstance(inside, dict) and part not in inside:
             return f"; there are {', '.join(inside)}"
         if not isinstance(inside, list | dict):
-            return ""
+            break
         inside = inside[part]
     return ""
 
@@ -138,14 +135,11 @@ def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Cas
     try:
         _change(table, control.key, control.value, place, add=False)
     except InputError as error:
-        raise InputError(join(place, "negative_control.key"), f'"{control.key}"', "a key of this scene") from error
+        raise _wrong(case, "key", "a key of this scene") from error
     try:
         return _scene(table, path)
     except InputError as error:
-        why = str(error).removeprefix(f"{place}: ")
-        raise InputError(
-            join(place, "negative_control.value"), _value_text(control), f"a value that can be read ({why})"
-        ) from error
+        raise _wrong(case, "value", f"a value that can be read ({str(error).removeprefix(f'{place}: ')})") from error
 
 
 def _check_negative_control(case: Case, changed: Case) -> None:
@@ -153,14 +147,15 @@ def _check_negative_control(case: Case, changed: Case) -> None:
     if control is None or changed.decides != case.decides:
         return
     if changed.model_copy(update={"negative_control": control}) == case:
-        place = join(case.place, "negative_control.value")
-        raise InputError(place, _value_text(control), f"a value that changes {control.key}")
-    want = "a key that changes what is solved, which alone can turn a verdict: of an effect, say"
-    raise InputError(join(case.place, "negative_control.key"), f'"{control.key}"', want)
+        raise _wrong(case, "value", f"a value that changes {control.key}")
+    raise _wrong(case, "key", "a key that changes what is solved, which alone can turn a verdict: of an effect, say")
 
 
-def _value_text(control: NegativeControl) -> str:
-    return f'"{control.value}"' if isinstance(control.value, str) else repr(control.value)
+def _wrong(case: Case, part: str, want: str) -> InputError:
+    """The error of a ``part`` of the negative control."""
+    value = getattr(case.negative_control, part)
+    got = f'"{value}"' if isinstance(value, str) else repr(value)
+    return InputError(join(case.place, f"negative_control.{part}"), got, want)
 
 
 def _scene(table: dict[str, Any], path: Path) -> Case:
@@ -197,8 +192,8 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface. A
-    bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
+    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the
+    surface. A bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
     """
     acting = [(name, getattr(effect, "on", "")) for name, effect in zip(names, effects, strict=True)]
     known = [moduli([effect]) for effect in effects]

@@ -15,24 +15,13 @@ from fem_reference.scenes.muscle import MuscleCase
 
 
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
-    """Make a case from the keys that a ``case.toml`` has, without a file.
+    """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without
+    a file.
 
-    Parameters
-    ----------
-    table
-        Keys and tables as in a scene file (``cases/hip_flexion/case.toml`` explains each), with a ``domain`` of a scalar field,
-        else of a muscle. Where files have text with a unit, numbers in mm, N, MPa, s, rad and tonne do as well. Effects may be
-        those of :func:`fem_reference.make_effect`. ``candidate``, ``expect`` and ``negative_control`` may be left out.
-    folder
-        What files are named relative to.
-    name
-        What pages call the case.
-
-    Raises
-    ------
-    InputError
-        Where a key is missing, unknown or wrong; it names the key, what was got and what is wanted.
-
+    A ``table`` with a ``domain`` is of a scalar field, else of a muscle. Where files have text with a unit, numbers in
+    mm, N, MPa, s, rad and tonne do as well. Effects may be those of :func:`fem_reference.make_effect`. ``candidate``,
+    ``expect`` and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the
+    ``name``. InputError where a key is missing, unknown or wrong names the key, what was got and what is wanted.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
         raise InputError("case", said(table), "keys and tables, as a case.toml has them")

@@ -156,9 +156,9 @@ class CaseBone(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into eight
-    (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of boxes, each cut
-    into six (``"block"``).
+    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into
+    eight (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of
+    boxes, each cut into six (``"block"``).
     """
 
     surface: str
@@ -185,8 +185,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the bone) and
-    ``outline``: with springs of a ``stiffness`` over its area, without it exactly.
+    """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
+    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: Name
@@ -258,8 +258,8 @@ class Frames(Record):
 
 
 class MuscleCase(Case):
-    """The case of a muscle. Its key ``effects`` (``choice``) says whether all effects that are listed act, or those of them that
-    the case needs: "auto".
+    """The case of a muscle. Its key ``effects`` (``choice``) says whether all effects that are listed act, or those of
+    them that the case needs: "auto".
     """
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")

@@ -16,7 +16,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
-from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, WrappingSurface, straight
+from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
@@ -95,7 +95,7 @@ class Lines:
 class Wrap:
     """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
-    obstacle: WrappingSurface
+    obstacle: WrappingSphere | WrappingCylinder
     bone: Bone
     name: str
 

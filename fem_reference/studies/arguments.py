@@ -13,11 +13,16 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
 
+def check[T](given: object, kind: type[T], place: str, want: str) -> T:
+    """The argument that is ``given``; InputError unless it is of a ``kind``."""
+    if not isinstance(given, kind):
+        raise InputError(place, said(given), want)
+    return given
+
+
 def check_case(case: object) -> Case:
     """The case; InputError unless it is one."""
-    if not isinstance(case, Case):
-        raise InputError("case", said(case), "a Case, such as load_case returns")
-    return case
+    return check(case, Case, "case", "a Case, such as load_case returns")
 
 
 def is_of_body(reference: object, of: object) -> bool:
@@ -45,12 +50,6 @@ def check_solver(solver: object, settings: Mapping[str, object]) -> None:
         raise InputError(f"settings {', '.join(settings)}", "no solver", want)
 
 
-def check_progress(progress: object) -> None:
-    """InputError unless it can be called, or is None."""
-    if progress is not None and not callable(progress):
-        raise InputError("progress", said(progress), "a function of a line, such as print, or None")
-
-
 def free_folder(given: object, place: str) -> Path:
     """The path of a folder that is there or can be made."""
     folder = path(given, place)
@@ -60,43 +59,36 @@ def free_folder(given: object, place: str) -> Path:
     return folder
 
 
-def check_comparison(comparison: object) -> None:
-    """InputError unless it is a comparison."""
-    if not isinstance(comparison, Comparison):
-        raise InputError("comparison", said(comparison), "a Comparison, such as compare returns")
+def check_comparison(comparison: object) -> Comparison:
+    """The comparison; InputError unless it is one."""
+    return check(comparison, Comparison, "comparison", "a Comparison, such as compare returns")
 
 
 def check_error_bars(bars: object, case: Case) -> None:
     """InputError unless they are error bars of a reference of the ``case``, or None."""
-    if bars is not None and not isinstance(bars, ErrorBars):
-        raise InputError("error_bars", said(bars), "ErrorBars, such as error_bars returns, or None")
-    if bars is not None and bars.numbers != case.numbers:
-        raise InputError(
-            "error_bars", f"those of frames {bars.numbers}", f"those of frames {case.numbers}, of the case"
-        )
+    if bars is None:
+        return
+    known = check(bars, ErrorBars, "error_bars", "ErrorBars, such as error_bars returns, or None")
+    if known.numbers != case.numbers:
+        want = f"those of frames {case.numbers}, of the case"
+        raise InputError("error_bars", f"those of frames {known.numbers}", want)
 
 
-def check_run(run: object, case: Case, place: str) -> None:
+def check_run(given: object, case: Case, place: str) -> None:
     """InputError unless it is a run of the ``case``, as far as it says of which."""
-    if not isinstance(run, Run):
-        raise InputError(place, said(run), "a Run, such as solve and read_run return")
-    scene = run.origin.get("scene")
-    if scene is not None and scene not in (case.key, _as_solved(run, case).key):
+    run = check(given, Run, place, "a Run, such as solve and read_run return")
+    scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
+    keys = {case.key}
+    if case.decisions and isinstance(effects, Mapping):  # of a run for which it was found out which it needs
+        acting = tuple(one.effect for one in case.decisions if one.effect.title in effects)
+        keys.add(case.model_copy(update={"effect": acting}).key)
+    if scene is not None and scene not in keys:
         got = f'a run of another case ("{run.origin.get("case", "without a name")}")'
-        raise InputError(f'{place} "{run.name}"', got, f'one of "{case.name}" with all its keys as they are')
+        raise InputError(place, got, f'one of "{case.name}" with all its keys as they are')
     if run.carries.isdisjoint(case.carries):
-        got = f"a run of {', '.join(sorted(run.carries))}"
-        raise InputError(f'{place} "{run.name}"', got, f"one of {', '.join(sorted(case.carries))}")
-
-
-def _as_solved(run: Run, case: Case) -> Case:
-    """The ``case`` with the effects of a ``run``, where it was found out which it needs."""
-    effects = run.origin.get("effects")
-    if not case.decisions or not isinstance(effects, Mapping):
-        return case
-    return case.model_copy(
-        update={"effect": tuple(one.effect for one in case.decisions if one.effect.title in effects)}
-    )
+        raise InputError(
+            place, f"a run of {', '.join(sorted(run.carries))}", f"one of {', '.join(sorted(case.carries))}"
+        )
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:

@@ -9,20 +9,18 @@ import multiprocessing
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.runs import store as runs
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.ladders import Trial
-from fem_reference.studies.scene_changes import without_states
+from fem_reference.studies.variations import Trial, without_states
 
 log = logging.getLogger(__name__)
 
@@ -64,12 +62,12 @@ class Made:
     @property
     def reached(self) -> Run | None:
         """The run, None where it did not reach all frames."""
-        return self.run if self.outcome.status == "converged" else None
+        return self.run if self.ended[0] == "converged" else None
 
     @property
-    def outcome(self) -> Outcome:
-        """The outcome of the run, ``"refused"`` where there is none."""
-        return self.run.outcome if self.run else Outcome("refused", self.failure)
+    def ended(self) -> tuple[str, str]:
+        """Status and message of the run, the status ``"refused"`` where there is none."""
+        return (self.run.outcome.status, self.run.outcome.message) if self.run else ("refused", self.failure)
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
@@ -91,7 +89,7 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
     made = []
     for i, trial in enumerate(trials):
         log.info("run %d of %d: %s", i + 1, len(trials), trial.label)
-        made.append(_made(trial, partial(solve, trial, store)))
+        made.append(_made(trial, store))
     return tuple(made)
 
 
@@ -114,10 +112,10 @@ def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
     return _BENCHES[key]
 
 
-def _made(trial: Trial, result: Callable[[], Run]) -> Made:
-    """A trial with its result; bad input and what is not installed are no reason to give up the others."""
+def _made(trial: Trial, store: Path) -> Made:
+    """A trial with its result; bad input or a missing package ends this trial alone."""
     try:
-        return Made(trial, result())
+        return Made(trial, solve(trial, store))
     except (InputError, MissingSoftware) as error:
         return Made(trial, None, str(error).replace(f"{trial.scene.folder}{os.sep}", ""))
 
@@ -126,43 +124,34 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
     made, begin, count = dict[int, Made](), time.perf_counter(), len(trials)
     for attempt in range(ATTEMPTS):
         wanted = [i for i in range(count) if i not in made]
-        if not wanted:
-            break
-        if attempt:
+        if wanted and attempt:
             log.info("a worker ended before its time; %d runs are tried again", len(wanted))
         try:
             with _executor(workers) as executor:
-                futures = {executor.submit(_stored, trials[i], store): i for i in wanted}
+                futures = {executor.submit(_by_worker, trials[i], store): i for i in wanted}
                 for future in as_completed(futures):
                     i = futures[future]
-                    made[i] = _made(trials[i], partial(_result, future, trials[i]))
-                    _log(made[i], len(made), count, time.perf_counter() - begin)
+                    folder, failure = future.result()
+                    made[i] = Made(trials[i], _loaded(folder, trials[i]) if folder else None, failure)
+                    seconds = (time.perf_counter() - begin) / len(made) * (count - len(made))
+                    left = f", about {seconds:.0f} s left" if len(made) < count else ""
+                    status = failure or made[i].ended[0]
+                    log.info("run %d of %d: %s: %s%s", len(made), count, trials[i].label, status, left)
         except BrokenProcessPool:
             continue
+        break
     lost = f"its worker ended before its time, {ATTEMPTS} times"
     return tuple(made.get(i, Made(trial, None, lost)) for i, trial in enumerate(trials))
 
 
+def _by_worker(trial: Trial, store: Path) -> tuple[Path | None, str]:
+    """The folder of the run that a worker made of a trial, or why there is none: the run itself is read from the store."""
+    found = _made(trial, store)
+    return found.run.folder if found.run else None, found.failure
+
+
 def _loaded(folder: Path, trial: Trial) -> Run:
     return replace(runs.load(folder), name=trial.name)
-
-
-def _result(future: Future[Path], trial: Trial) -> Run:
-    """The run of a worker, which is read from the store."""
-    return _loaded(future.result(), trial)
-
-
-def _log(one: Made, done: int, count: int, passed: float) -> None:
-    status = one.failure or one.outcome.status
-    left = f", about {passed / done * (count - done):.0f} s left" if done < count else ""
-    log.info("run %d of %d: %s: %s%s", done, count, one.trial.label, status, left)
-
-
-def _stored(trial: Trial, store: Path) -> Path:
-    """Solve a trial in a worker; the folder of its run in the store."""
-    folder = solve(trial, store).folder
-    assert folder is not None  # what a solver of ours makes is stored
-    return folder
 
 
 @contextmanager

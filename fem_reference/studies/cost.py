@@ -15,16 +15,14 @@ from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import made_with
-from fem_reference.runs.reached import complete, seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete, seconds_per_frame
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, each
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
-from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
-from fem_reference.studies.scene_changes import carried, resample
 from fem_reference.studies.true_errors import claims_of
+from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials, carried, reference_trials, resample
 
 log = logging.getLogger(__name__)
 
@@ -40,9 +38,7 @@ _CLAIMING = 4
 
 
 def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
-    """Study each of ``scenes`` with runs in ``store``, solved where that was not done before; ``only`` solvers of these
-    names, where there are any.
-    """
+    """Study each of ``scenes`` with runs in ``store``, solved where they are missing; ``only`` these solvers, if any."""
     cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
     return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
@@ -104,19 +100,10 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
 
 def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **settings_of(trial)}
-    return Point(
-        trial.scene.name,
-        trial.choice.solver,
-        trial.name,
-        trial.knob,
-        trial.value,
-        choice | ({"scene": trial.changed} if trial.changed else {}),
-        one.outcome.status,
-        one.outcome.message,
-        errors={} if run is None else errors(run, truth, context),
-        costs={} if run is None else costs(run),
-    )
+    choice = {"solver": trial.choice.solver, **settings_of(trial)} | ({"scene": trial.changed} if trial.changed else {})
+    found = ({}, {}) if run is None else (errors(run, truth, context), costs(run))
+    named = trial.scene.name, trial.choice.solver, trial.name, trial.knob, trial.value
+    return Point(*named, choice, *one.ended, *found)
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
@@ -131,17 +118,13 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
-    """The greatest magnitude over the frames of each deviation of a ``run`` from the ``truth`` by metrics of these ``names``, not a
-    number where one frame is none; by ``metric.statistic``.
-    """
+    """The greatest magnitude over frames, NaN where one frame is, of deviations by metrics of these ``names``, by statistic."""
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
 
 
 def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float]:
-    """The greatest magnitudes of deviations of a ``run`` from the ``truth``; nothing of a run that did not reach every frame, and
-    nothing of the truth itself.
-    """
+    """The greatest deviations of a ``run`` from the ``truth``; empty for an unfinished run and for the truth itself."""
     if run.outcome.status != "converged" or run.folder == truth.folder:
         return {}
     found = greatest(carried(complete(run, truth.numbers), truth.surface), truth, context, METRICS)

@@ -19,10 +19,10 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import Watch
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import store
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run, collected
-from fem_reference.runs.writer import Writer
+from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class Bench[C: Case]:
-    """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
+    """A case with its set-up and its problem, each made once and only when it is needed, and the store of its runs."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
         self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
@@ -138,7 +138,7 @@ class Bench[C: Case]:
             assert run.folder is not None  # from the store
             folder = self.folder(choice, place)
             with making.locked(folder):  # goes on from what is kept of a run that was stopped for it
-                cut_off.pass_on(run.folder, folder)
+                pass_on(run.folder, folder)
 
     def _stored(self, wanted: Wanted) -> Run | None:
         run = wanted.stored(self._ended(wanted.choice.solver))

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -14,12 +14,11 @@ from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
-from fem_reference.geometry.lagrange import l2_distance
+from fem_reference.geometry.field_mesh import l2_distance
 from fem_reference.problems import of_case, scalar
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.scenes.scalar import Element, ScalarCase
 from fem_reference.studies import refinement
@@ -51,9 +50,7 @@ def compare(
 
 
 def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
-    """The convergence of the reference solver of a ``case`` with elements of order 1 and 2, as far as its ``problem`` can be
-    refined here; nothing of a muscle, whose error bars say more.
-    """
+    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2, where its mesh can be refined."""
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
@@ -71,30 +68,25 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
         built = scalar.build(case.model_copy(update={"element": element}), level)
         return built, solver.run(built, settings).values[0]
 
-    error, against = _error(case, lambda: solved(2, levels)[1])
+    exact = case.exact
+    truth = np.empty(0) if exact is not None else solved(2, levels)[1]
+    against = "the exact solution (L2)" if exact is not None else "the finest solution with P2 (rms at the vertices)"
+
+    def error(built: FieldProblem, values: Floats) -> float:
+        if exact is not None:
+            return l2_distance(built.mesh, values, partial(scalar.at, exact))
+        # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
+        # own vertices alone converge with h^2 log h, and not with h^2.
+        count = len(built.mesh.points)
+        return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
+
     for order in (1, 2):
         # Without an exact solution the finest one of order 2 is what the others are measured against.
         finest = levels if order == 1 or case.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)
         scale = float(np.abs(steps[-1][1]).max())
-        exact = len(errors) < 2 or not errors[-1] > _EXACT * scale
-        measured = math.nan if exact else math.log2(errors[-2] / errors[-1])
+        rounding = len(errors) < 2 or not errors[-1] > _EXACT * scale
+        measured = math.nan if rounding else math.log2(errors[-2] / errors[-1])
         log.info("%s: elements of order %d measured on %d meshes", case.name, order, len(steps))
         yield Convergence(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
-
-
-def _error(case: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
-    """The error of a solution as a function of it, and the truth that this is measured against, in words."""
-    if case.exact is not None:
-        exact = partial(scalar.at, case.exact)
-        return (lambda built, values: l2_distance(built.mesh, values, exact)), "the exact solution (L2)"
-    # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
-    # own vertices alone converge with h^2 log h, and not with h^2.
-    truth = finest()
-
-    def rms(built: FieldProblem, values: Floats) -> float:
-        count = len(built.mesh.points)
-        return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
-
-    return rms, "the finest solution with P2 (rms at the vertices)"

@@ -13,15 +13,15 @@ from filelock import FileLock, Timeout
 
 from fem_reference.assessment import error_bars
 from fem_reference.foundations.records import Record
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
 from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.stresses import Watch
-from fem_reference.runs import cut_off, states, store
+from fem_reference.runs import states, store
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Frame, Outcome, Run
-from fem_reference.runs.writer import Writer
+from fem_reference.runs.writer import Writer, places
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.protocol import AnySolver
 
@@ -43,9 +43,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run that ``ended`` so, under the name that it has here; None where there is none, other packages made it, or
-        it lacks states that the settings ask for.
-        """
+        """The stored run that ``ended`` so; None without one, by other packages, or where it lacks states that are wanted."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -90,7 +88,7 @@ def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple
     """The effects that matter at each of the frames ``numbers`` that a ``folder`` stores, as ``watch`` sees them anew."""
     watch.frames.clear()
     for number in numbers:
-        yield watch.see(number, *cut_off.places(folder, number))
+        yield watch.see(number, *places(folder, number))
 
 
 def _stop_for(found: Sequence[Decision]) -> None:
@@ -101,9 +99,7 @@ def _stop_for(found: Sequence[Decision]) -> None:
 
 
 def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
-    """Solve, with each frame written as it is reached, and the cost of all; ``watch`` sees each frame, and may stop the run. A run
-    that failed before its first frame has the state at rest.
-    """
+    """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state."""
 
     def add(frame: Frame) -> None:
         writer.add(frame)

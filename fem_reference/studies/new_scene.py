@@ -56,22 +56,11 @@ def copied(case: str, folder: Path) -> None:
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """A scene in a new ``folder`` that can be run, with the surfaces in mm; returns the unit that they were read in.
+    """A scene in a new ``folder``, which names it, with the surfaces in mm; returns the unit that they were read in.
 
-    Parameters
-    ----------
-    folder
-        Where it goes; its name is the name of the scene.
-    muscle, bones
-        Files of triangles. The muscle is attached to the two bones that it is nearest to, and the second of these moves.
-    unit
-        Of all of them, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones are.
-
-    Raises
-    ------
-    InputError
-        Names the file that cannot be used, or what cannot be guessed.
-
+    ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
+    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones.
+    InputError names the file that cannot be used, or what cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more: a muscle goes from one to another")
@@ -81,7 +70,10 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     _new(folder)
     body, *others = (files.read_surface(path, 1.0) for path in (muscle, *bones))
     used = guessed_unit(body, others) if unit is None else Unit(unit)
-    factor = _factor(used.name)
+    try:
+        factor = length_unit(used.name)
+    except ValueError as error:
+        raise InputError("--unit", f'"{unit}"', str(error)) from error
     ends = {name: _welded(one, factor) for name, one in zip(names, others, strict=True)}
     write(folder, check_closed(_welded(body, factor)), ends)
     return used
@@ -111,7 +103,7 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """The ``name`` on one line, without what is not printed, and not too long."""
+    """The ``name`` on one line, of printable characters, and not too long."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 
@@ -124,22 +116,11 @@ def _distinct(name: str, taken: Container[str]) -> str:
 
 def _new(folder: Path) -> Path:
     if not is_name(folder.name):
-        raise InputError(
-            "NAME",
-            f'"{folder.name}"',
-            "what a scene can be called: at most 100 printable characters, no blanks at the ends",
-        )
+        want = "what a scene can be called: at most 100 printable characters, no blanks at the ends"
+        raise InputError("NAME", f'"{folder.name}"', want)
     if folder.exists():
         raise InputError("NAME", f'"{folder}", which is there already', "the name of a folder that is not there yet")
     return folder
-
-
-def _factor(unit: str) -> float:
-    """The length [mm] of a unit of the command line."""
-    try:
-        return length_unit(unit)
-    except ValueError as error:
-        raise InputError("--unit", f'"{unit}"', str(error)) from error
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
@@ -159,16 +140,13 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
 
 
 def _welded(surface: Surface, unit: float) -> Surface:
-    """The surface in mm, with one point where several are the same: STL files have three points a triangle."""
+    """The surface in mm, with one point where several are the same, in their order: STL files have three points a triangle."""
     points = surface.points * unit
-    rounded = np.round(points, 6)
-    _, first, which = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)  # as they come
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    triangles = place[which.ravel()[surface.triangles]]
-    whole = np.array([len({*corners}) == 3 for corners in triangles.tolist()], bool)
-    return Surface(points[np.sort(first)], triangles[whole], surface.place)
+    _, first, which = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
+    place = first.argsort().argsort()
+    a, b, c = corners = place[which.ravel()[surface.triangles]].T
+    whole = (a != b) & (b != c) & (c != a)
+    return Surface(points[np.sort(first)], corners.T[whole], surface.place)
 
 
 def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached, _Attached]:
@@ -180,9 +158,9 @@ def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached,
             got = f'the bone "{name}" {gap:.3g} mm from it, which is {diagonal(muscle.points):.3g} mm long'
             raise InputError(muscle.place, got, "surfaces in one unit (--unit) that are beside each other")
     for share in _ATTACHED:
-        ends = [_nearest(name, away[name], share) for name in (first, second)]
-        if not set(ends[0].vertices.tolist()) & set(ends[1].vertices.tolist()):
-            return ends[0], ends[1]
+        one, other = (_nearest(name, away[name], share) for name in (first, second))
+        if not np.intersect1d(one.vertices, other.vertices).size:
+            return one, other
     got = f"{first} and {second} at the same end of it"
     raise InputError(muscle.place, got, "bones at either end (or a scene of your own with lists of vertices)")
 

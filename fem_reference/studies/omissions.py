@@ -24,7 +24,7 @@ from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
 from fem_reference.studies.cost import greatest, known
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.ladders import Trial
+from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
@@ -46,9 +46,7 @@ class LeftOut:
 
 
 def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
-    """The reference and the candidates of a case, whole and with each thing left out that can be; runs are in ``store``, solved
-    where that was not done before.
-    """
+    """The reference and the candidates of a case, whole and with each part left out; runs in ``store`` are not solved again."""
     with fenicsx.shared():
         if workers == Workers():
             _warm_up(case, store)
@@ -78,9 +76,7 @@ def name_of(effect: Effect) -> str:
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
-    """The optional features that a choice of a solver has: keys whose default is None, but those that trade accuracy for time or
-    change the time alone.
-    """
+    """The optional features that a choice has: keys whose default is None, but those that trade accuracy or change time alone."""
     record = solvers.find(choice.solver, place).settings
     optional = {key for key, entry in record.model_fields.items() if entry.default is None}
     optional -= {*solvers.trades(record), *MACHINE_ONLY}
@@ -134,9 +130,7 @@ def _wholes(case: MuscleCase) -> list[Trial]:
 
 
 def _warm_up(case: MuscleCase, store: Path) -> None:
-    """Solve the first frames with each candidate, and keep nothing: what is then measured in this process is compiled, and its
-    processor time is that of solving.
-    """
+    """Solve the first frames with each candidate and keep nothing: what is measured later is compiled already."""
     bench = shared_bench(case, store)
     for trial in _wholes(case)[1:]:
         if solvers.takes_effects(trial.choice.solver):
@@ -180,16 +174,16 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
     for part, other in others:
         changed = {} if context is None or one.run is None else changes(other, one.run, context)
         predicted = _predicted(trial.scene, part) if takes_effects else {}
-        found.append(_omission(other, part.names, changes=changed, predicted=predicted))
+        found.append(replace(_omission(other, part.names), changes=changed, predicted=predicted))
     named = {name for part in parts(trial) for name in part.names}
     kept = tuple(name for name in there if name not in named)
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
 
 
-def _omission(one: Made, left_out: tuple[str, ...], **measured: dict[str, float]) -> Omission:
-    """The end of a run and its cost, beside what was ``measured`` on it."""
-    end = one.outcome
-    return Omission(left_out, end.status, end.message, costs=dict(end.cost), instead=one.trial.changed, **measured)
+def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
+    """The end of a run and its cost."""
+    costs = dict(one.run.outcome.cost) if one.run else {}
+    return Omission(left_out, *one.ended, costs=costs, instead=one.trial.changed)
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
@@ -202,9 +196,7 @@ def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
 
 
 def changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:
-    """The greatest magnitude over the frames of each change from the ``whole``, by ``metric.statistic``; nothing of a run that did
-    not reach every frame, or where one is no number.
-    """
+    """The greatest change over frames from the ``whole`` by ``metric.statistic``; empty for an unfinished run or a NaN."""
     if one.reached is None:
         return {}
     found = greatest(one.reached, whole, context, {name.split(".")[0] for name in MEASURES})

@@ -22,19 +22,12 @@ from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import context_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer as on_finer_cells
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.scene_changes import (
-    on_tetrahedra,
-    with_contact,
-    with_distances,
-    with_reference,
-    without_states,
-)
+from fem_reference.studies.variations import on_tetrahedra, with_contact, with_distances, without_states
 
 log = logging.getLogger(__name__)
 
@@ -57,9 +50,9 @@ Vary = Callable[[MuscleCase], MuscleCase]
 
 
 def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
-    """Changes that each halve one cause of numerical error apart from tetrahedra, by name: of contact its stiffness and smoothing,
-    and how well the distances to surfaces of bones are known and how far they are rounded, unless no bone ``pressed``; load
-    steps, where the reference's ``settings`` have them, with drag or viscosity only: else a state does not depend on them.
+    """Changes by name that each halve one cause of numerical error beside tetrahedra: the compliance and smoothing of contact, and
+    the error and rounding of distances to bones, unless no bone ``pressed``; load steps, where the ``settings`` have them, with
+    drag or viscosity only: else a state does not depend on them.
     """
     found, contact = dict[str, Vary](), among(case.effects)
     if contact is not None and pressed:
@@ -76,7 +69,8 @@ def half_steps(case: MuscleCase, settings: Record) -> Vary:
     """Load steps of at most half the length: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
-    return partial(with_reference, first_step=own["first_step"] / 2, largest_step=largest)
+    halved = {"first_step": own["first_step"] / 2, "largest_step": largest}
+    return lambda one: one.model_copy(update={"reference": one.reference.model_copy(update=halved)})
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
@@ -101,9 +95,7 @@ def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars
 
 
 def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | None:
-    """New error bars where they were ``asked`` for; else those that are stored, or new ones where they cost less than a fifth of
-    the reference, or None, as of a run that did not converge or has no interior.
-    """
+    """Error bars: new ones where ``asked`` for; else stored ones, or new ones that cost less than a fifth of the reference."""
     if asked:
         return obtain(bench, reference)
     found = stored(reference)
@@ -119,7 +111,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run) -> ErrorBars | None:
-    """The error bars stored beside a reference run, None without any that are of this run and of these metrics."""
+    """The error bars stored beside a reference run; None where there are none, or they are of another run or of other metrics."""
     if reference.folder is None:
         return None
     bars = error_bars.load(reference.folder, _of(reference))
@@ -191,9 +183,9 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 def _solved(bench: Bench[MuscleCase], case: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
-    other = Bench(case, bench.store, bench.ranks)
     try:
-        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
+        choice = without_states(case.reference)
+        run = Bench(case, bench.store, bench.ranks).obtain(f"reference, {name}", choice, "reference")
     except InputError as error:
         got = f"a scene that cannot be set up ({error})"
         raise InputError(f"error bar, {name}", got, "a finer reference") from error

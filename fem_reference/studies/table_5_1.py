@@ -9,8 +9,7 @@ from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.metrics import Measure, context_of, in_tables, measure
 from fem_reference.runs.key import versions
-from fem_reference.runs.reached import complete, seconds_per_frame
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete, seconds_per_frame
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
@@ -36,9 +35,7 @@ FOREIGN = "Yours"
 
 
 def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
-    """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
-    read before anything is solved.
-    """
+    """The table over ``scenes``, with runs in ``store``; ``foreign`` frames, by case, are read before anything is solved."""
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {
@@ -91,15 +88,6 @@ def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]
     cost = run.outcome.cost
     # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
-    return SolverResult(
-        kind,
-        run.name,
-        run.solver,
-        case.name,
-        run.outcome,
-        seconds_per_frame(run) if given is None else given,
-        measures,
-        run.numbers,
-        str(run.origin["machine"]),
-        of_reference=kind == REFERENCE,
-    )
+    seconds = seconds_per_frame(run) if given is None else given
+    named, machine = (kind, run.name, run.solver, case.name), str(run.origin["machine"])
+    return SolverResult(*named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE)

@@ -9,8 +9,7 @@ from pathlib import Path
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.metrics import MeasurementContext, change, context_of, measure
-from fem_reference.runs.reached import complete
-from fem_reference.runs.store import Run
+from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import each
@@ -52,9 +51,7 @@ def _of(case: MuscleCase, store: Path) -> list[Claim]:
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
-    """The claims of the ``bars`` of the first of two runs about its change from rest and about deviations from it; the second is a
-    sharper solution.
-    """
+    """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is a sharper solution."""
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
     surfaces = [replace(one, fibres=None, fibre_positions=None) for one in runs]  # as candidates are

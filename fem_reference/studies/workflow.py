@@ -78,7 +78,6 @@ def solve(
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings)
-    arguments.check_progress(progress)
     folder = arguments.free_folder(store, "store")
     choice: SolverChoice = case.reference
     if solver is not None:
@@ -152,7 +151,6 @@ def error_bars(
         where the reference did not converge.
 
     """
-    arguments.check_progress(progress)
     with reported(progress):
         if arguments.is_of_body(reference, case):
             return refinement.body_bars(reference)
@@ -270,7 +268,6 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
         ``outcome``. How far they are from the truth on cells of this size, :func:`error_bars` says.
 
     """
-    arguments.check_progress(progress)
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")
         return second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))

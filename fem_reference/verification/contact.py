@@ -15,8 +15,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import SYMMETRY, clamped, neo_hooke
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import SYMMETRY, clamped, control, find, neo_hooke
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
@@ -110,8 +109,7 @@ ENTRIES = (
             unit="N",
             measure=plate,
             given={"element": element, "stiffness": PLATE_STIFFNESS},
-            negative_control="a plate 1 % stiffer",
-            wrong={"stiffness": 1.01 * PLATE_STIFFNESS},
+            **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=known_plate,
             within=1e-9,
             relative=True,
@@ -129,8 +127,7 @@ ENTRIES = (
             unit=unit,
             measure=ball,
             given={"value": value, "radius": RADIUS},
-            negative_control="a ball of twice the radius",
-            wrong={"radius": 2 * RADIUS},
+            **control("a ball of twice the radius", radius=2 * RADIUS),
             truth=partial(known_ball, value.__name__),
             within=0.02,
             relative=True,

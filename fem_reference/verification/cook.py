@@ -15,8 +15,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
-from fem_reference.verification.parts import clamped, nearest, neo_hooke, ramp, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, control, find, nearest, neo_hooke, ramp, sliding
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
@@ -74,25 +73,22 @@ def ratio(lab: Lab, n: int, **panel: Any) -> float:
 COMPRESSIBLE = {"name": "COMPRESSIBLE", "share": SMALL}
 NEARLY = {"name": "NEARLY_INCOMPRESSIBLE", "share": SMALL}
 SOURCE = "validation/cook.py: finite elements of degree 6 to 10 of our own in numpy, on graded grids; Cook 1974"
-MEMBRANE = partial(
-    Entry,
-    group="Cook's membrane",
-    kind="second solver",
-    source=SOURCE,
-)
+MEMBRANE = partial(Entry, group="Cook's membrane", kind="second solver", source=SOURCE)
 # The clamped corners are singular: the error falls at order 1 or more.
 TIP = partial(MEMBRANE, unit="mm", measure=tip, relative=True, refinement=Refinement((4, 8, 16), HEIGHT, order=1))
-LINEAR = "linear tetrahedra without a pressure"
-STIFF = {"negative_control": "the shear modulus is 2 % too high", "wrong": {"shear": 1.02}}
-SMALL_STRAIN = {"negative_control": "small strain, by linear extrapolation of a tiny load", "wrong": {"share": SMALL}}
+LINEAR = control("linear tetrahedra without a pressure", element="P1")
+SOFTER = control(
+    "Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus", shear=1.4**-1 * 4 / 3, bulk=5 / 3
+)
+STIFF = control("the shear modulus is 2 % too high", shear=1.02)
+SMALL_STRAIN = control("small strain, by linear extrapolation of a tiny load", share=SMALL)
 
 ENTRIES: tuple[Entry, ...] = (
     TIP(
         name="cook_compressible",
         title="Cook's membrane at small strain, Poisson's ratio 1/3: tip by quadratic tetrahedra",
         given={**COMPRESSIBLE, "element": "P2"},
-        negative_control="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
-        wrong={"shear": 1.4**-1 * 4 / 3, "bulk": 5 / 3},
+        **SOFTER,
         truth=cook.COMPRESSIBLE.tip,
         within=0.005,
         because="discretisation, limited by the singular clamped corners: 0.15 % too stiff",
@@ -113,8 +109,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_nearly_incompressible",
         title="Cook's membrane at small strain, Poisson's ratio 0.4999: tip by quadratic tetrahedra with a pressure",
         given={**NEARLY, "element": "P2/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **LINEAR,
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.005,
         because="discretisation, limited by the singular clamped corners: 0.16 % too stiff",
@@ -133,8 +128,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_constant_pressure",
         title="The same by linear hexahedra with a constant pressure",
         given={**NEARLY, "element": "Q1/P0"},
-        negative_control="linear hexahedra without a pressure",
-        wrong={"element": "Q1"},
+        **control("linear hexahedra without a pressure", element="Q1"),
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.015,
         because="discretisation by linear cells: 0.5 % too stiff",
@@ -144,8 +138,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="cook_stabilised",
         title="The same by linear tetrahedra with a linear pressure that is stabilised",
         given={**NEARLY, "element": "P1/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **LINEAR,
         truth=cook.NEARLY_INCOMPRESSIBLE.tip,
         within=0.04,
         because="discretisation by linear cells: 22, 7.7 and 2.2 % too stiff in 8, 16 and 32 cells a side",
@@ -189,8 +182,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P1"},
-        negative_control="quadratic tetrahedra with a pressure",
-        wrong={"element": "P2/P1"},
+        **control("quadratic tetrahedra with a pressure", element="P2/P1"),
         truth=LOCKED / 2,
         within=LOCKED / 2,
         because="the band is all from 0 to 0.5: less than half of the displacement is called locked; how much less is no truth",
@@ -203,8 +195,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},
-        negative_control=LINEAR,
-        wrong={"element": "P1"},
+        **LINEAR,
         truth=1.0,
         within=0.01,
         because="discretisation: 0.8 % too stiff in 8 by 8 cells",

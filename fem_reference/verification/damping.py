@@ -1,4 +1,4 @@
-"""Drag of the ground: a free body, and a bar that creeps back."""
+"""Resistance to motion: drag of the ground and viscosity of the matrix, in a steady motion and in a body that creeps back."""
 
 from functools import partial
 
@@ -7,20 +7,25 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.paths import Affine
+from fem_reference.runs.store import Run
 from fem_reference.verification.homogeneous import MU
 from fem_reference.verification.loads import FREE_FALL, MUSCLE, weight
-from fem_reference.verification.parts import UP_AND_GONE, frames, neo_hooke, relaxation_rate, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, control, find, frames, neo_hooke, sliding
 
-damping = find("damping")
-SECONDS = 0.1  # from a frame number to the next
+damping, viscosity = find("damping"), find("viscosity")
+SECONDS = 0.1  # from a frame number to the next, with a drag
 DRAG = 1e-4  # of a block that falls through something viscous [MPa s/mm2]
 # A bar in a smooth box: its length [mm], bulk modulus [MPa] and the rate at which it creeps back [1/s].
 LENGTH, SOFT, RATE = 10.0, 5 * MU, 5.0
 CREEP = (SOFT + 4 / 3 * MU) * (np.pi / (2 * LENGTH)) ** 2 / RATE  # [MPa s/mm2]
 LIGHT = 1e-6  # a weight [N/mm3], for a stretch of 1e-4
-FROM, TO = 4, 6  # frames between which the rate is measured
+ETA, VISCOUS_SECONDS = 0.02, 1.5  # of the viscous blocks [MPa s], and from a frame number to the next [s]
+BULK = 1e6 * MU  # so high that the truth of incompressible material is met to 1e-6
+STRESS = 3e-4 * MU  # a small weight on the top of a block until frame 1, which then creeps back
+# Loads that are gone at frame 2.
+UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
 
 def velocity(lab: Lab, seconds: float) -> float:
@@ -32,19 +37,60 @@ def velocity(lab: Lab, seconds: float) -> float:
     return float(displacement[np.argmax(np.abs(displacement))]) / (4 * SECONDS)
 
 
-def creep_rate(lab: Lab, n: int, coefficient: float) -> float:
-    """The rate [1/s] at which the bar creeps back when its weight is gone, in n load steps a frame."""
+def force(lab: Lab, n: int, eta: float) -> float:
+    """The force [N] of a smooth plate that has come down to half the height in one frame, in n load steps."""
+    plate = Prescribed("plate", "z1", (2,), Affine(NO_GRADIENT, (0.0, 0.0, -0.5)))
+    mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+    acting = (*neo_hooke(MU, BULK), make("viscosity", eta=eta))
+    body = Body(mesh, acting, (*SYMMETRY, plate), frames(1, n), interval=VISCOUS_SECONDS)
+    return float(lab.solve(body, "P2/P1", first_step=1 / n).last.forces["plate"][2])
+
+
+def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
+    """The rate [1/s] at which the top of a body, its greatest z, goes back to rest between two states, ``seconds`` apart."""
+    rest = solved.states[0].points[:, 2].max()
+    ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]
+    return float(np.log(ends[0] / ends[1])) / seconds
+
+
+def bar_creep(lab: Lab, n: int, coefficient: float) -> float:
+    """The rate [1/s] at which the bar creeps back from frame 4 to 6 when its weight is gone, in n load steps a frame."""
     mesh = shapes.box((1, 1, 4), (2.0, 2.0, LENGTH), "hexahedron")
     pull = f"0, 0, {-LIGHT / MUSCLE} mm/s^2"
     gone = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=UP_AND_GONE)
     acting = (*neo_hooke(MU, SOFT, "Q2"), gone, make("damping", coefficient=coefficient))
-    walls = sliding("x0", "x1", "y0", "y1", "z0")
-    body = Body(mesh, acting, walls, frames(TO, TO * n), interval=SECONDS)
+    body = Body(mesh, acting, sliding("x0", "x1", "y0", "y1", "z0"), frames(6, 6 * n), interval=SECONDS)
     solved = lab.solve(body, "Q2", first_step=1 / n, residual=1e-15)
-    return relaxation_rate(solved, (FROM * n, TO * n), (TO - FROM) * SECONDS)
+    return relaxation_rate(solved, (4 * n, 6 * n), 2 * SECONDS)
 
 
-DAMPED = partial(Entry, group="damping", relative=True, kind="closed form")
+def block_creep(lab: Lab, n: int, eta: float) -> float:
+    """The rate [1/s] at which the block creeps back from frame 2 to 3 when its weight is gone, in n load steps a frame."""
+    mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
+    gone = make("traction", on="z1", force=f"0, 0, {-STRESS} MPa", ramp=UP_AND_GONE)
+    acting = (*neo_hooke(MU, BULK), gone, make("viscosity", eta=eta))
+    body = Body(mesh, acting, SYMMETRY, frames(3, 3 * n), interval=VISCOUS_SECONDS)
+    solved = lab.solve(body, "P2/P1", first_step=1 / n, residual=1e-14)
+    return relaxation_rate(solved, (2 * n, 3 * n), VISCOUS_SECONDS)
+
+
+def halved(counts: tuple[int, ...], seconds: float, name: str) -> Refinement:
+    """Load steps of ``seconds / count``, by which implicit Euler finds the quantity ``name``."""
+    note = (
+        f"{name} by implicit Euler, whose sizes are seconds of a load step; the value is extrapolated from the last two"
+    )
+    return Refinement(counts, seconds, order=1, extrapolated=True, note=note)
+
+
+RESISTED = partial(Entry, relative=True, kind="closed form")
+DAMPED = partial(RESISTED, group="damping")
+VISCOUS = partial(
+    RESISTED,
+    group="viscosity",
+    given={"eta": ETA},
+    **control("A viscosity 1 % too small.", eta=0.99 * ETA),
+    within=7e-4,
+)
 
 ENTRIES: tuple[Entry, ...] = (
     DAMPED(
@@ -53,8 +99,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm/s",
         measure=velocity,
         given={"seconds": SECONDS},
-        negative_control="A time from frame to frame that is 1 % too long.",
-        wrong={"seconds": 1.01 * SECONDS},
+        **control("A time from frame to frame that is 1 % too long.", seconds=1.01 * SECONDS),
         truth=lambda: -damping.terminal_velocity(MUSCLE * FREE_FALL, DRAG),
         within=1e-9,
         because="Implicit Euler has a steady motion exactly, and so does the element, but for the residual: 1e-13 N are 2e-9 of "
@@ -66,21 +111,36 @@ ENTRIES: tuple[Entry, ...] = (
         title="Bar in a smooth box that creeps back when its weight is gone: rate of the slowest mode, by load steps that are "
         "halved",
         unit="1/s",
-        measure=creep_rate,
+        measure=bar_creep,
         given={"coefficient": CREEP},
-        negative_control="A drag 1 % too small.",
-        wrong={"coefficient": 0.99 * CREEP},
+        **control("A drag 1 % too small.", coefficient=0.99 * CREEP),
         truth=lambda: damping.relaxation_rate(MU, SOFT, CREEP, LENGTH),
         within=2e-3,
         because="Of x = rate times the longer load step, 1/16, implicit Euler without its first order leaves x^2 / 6 = 6.5e-4; the "
         "next mode, nine times as fast, has died out to 1e-5, and 1e-4 is how far the stretch is from small strain.",
         source="validation/damping.py, relaxation_rate",
-        refinement=Refinement(
-            (4, 8, 16),
-            SECONDS,
-            order=1,
-            extrapolated=True,
-            note="rate by implicit Euler, whose sizes are seconds of a load step; the value is extrapolated from the last two",
-        ),
+        refinement=halved((4, 8, 16), SECONDS, "rate"),
+    ),
+    VISCOUS(
+        name="viscous_squeeze",
+        title="Viscous block that smooth plates squeeze to half its height: their force, by load steps that are halved",
+        unit="N",
+        measure=force,
+        truth=lambda: viscosity.squeeze_force(MU, ETA, 0.5, -0.5 / VISCOUS_SECONDS, 1.0),
+        because="The last load step shortens the block by x of its height then, 1/64 in the longer steps. By hand the potential "
+        "errs by -2 x + 16/3 x^2 of the viscous part, 0.7 of the force; without the first order 0.7 * 8/3 x^2 = 4.6e-4 is left.",
+        source="validation/viscosity.py, squeeze_force",
+        refinement=halved((32, 64, 128), VISCOUS_SECONDS, "force"),
+    ),
+    VISCOUS(
+        name="viscous_creep",
+        title="Viscous block that creeps back when its weight is gone: rate, by load steps that are halved",
+        unit="1/s",
+        measure=block_creep,
+        truth=lambda: viscosity.creep_rate(MU, ETA),
+        because="Of x = rate times the longer load step = 0.047 implicit Euler without its first order leaves x^2 / 6 = 3.7e-4; "
+        "1e-4 is how far the strain is from a small one.",
+        source="validation/viscosity.py, creep_rate",
+        refinement=halved((8, 16, 32), VISCOUS_SECONDS, "rate"),
     ),
 )

@@ -7,8 +7,7 @@ import numpy as np
 
 from fem_reference.effects import make
 from fem_reference.verification.homogeneous import NEO, Material, Specimen, Y, force_entry, stretch_entry
-from fem_reference.verification.parts import ramp
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import find, ramp
 
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached
 laws, fibre_laws = find("laws"), find("fibre_laws")

@@ -12,8 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells
 from fem_reference.problems.paths import Along
-from fem_reference.verification.parts import clamped, nearest, ramp, resistance, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, control, find, nearest, ramp, resistance, sliding
 
 land = find("land")
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
@@ -120,8 +119,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="beam_follower",
         title="A beam of heart muscle under a pressure that stays normal to it: height of its end, by quadratic tetrahedra",
         given={"body": "beam", "point": land.BEAM_POINT, "element": "P2/P1", "degree": 1},
-        negative_control="5 % stiffer",
-        wrong={"stiff": 1.05},
+        **control("5 % stiffer", stiff=1.05),
         truth=land.TIP_OF_BEAM,
         within=0.003,
         because=f"0.3 %: {BOUND}; {FINE}, as its clamped edges are singular",
@@ -132,8 +130,7 @@ ENTRIES: tuple[Entry, ...] = (
             name=f"ventricle_passive_{where}_{by}",
             title=f"A ventricle filled at 10 kPa: where its apex goes {where}, by quadratic {by}",
             given={"body": "passive", "point": point, "element": element},
-            negative_control="20 % stiffer",
-            wrong={"stiff": 1.2},
+            **control("20 % stiffer", stiff=1.2),
             truth=land.PASSIVE_APICES[place],
             within=0.005,
             because=f"0.5 %: {BOUND}; the mesh leaves 0.1 %",
@@ -146,8 +143,7 @@ ENTRIES: tuple[Entry, ...] = (
             name=f"ventricle_active_{where}",
             title=f"A ventricle that contracts at 60 kPa against 15 kPa: where its apex goes {where}, by quadratic hexahedra",
             given={"body": "contracting", "point": point, "element": "Q2/Q1"},
-            negative_control="half the active tension",
-            wrong={"active": 0.5},
+            **control("half the active tension", active=0.5),
             truth=land.ACTIVE_APICES[place],
             within=0.005,
             because=f"0.5 %: {BOUND}; {FINE if place else 'the mesh leaves 1 % at the coarse and some 0.2 % at the fine step'}",

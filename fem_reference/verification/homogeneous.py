@@ -16,8 +16,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine, Along, Matrix, radially
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import SURFACE, SYMMETRY, resistance
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import SURFACE, SYMMETRY, control, find, resistance
 
 laws = find("laws")
 Vector = tuple[float, float, float]
@@ -145,8 +144,7 @@ def force_entry(group: str, name: str, title: str, specimen: Specimen, negative_
         unit="N",
         measure=force,
         given={"specimen": specimen},
-        negative_control=negative_control,
-        wrong={"specimen": replace(specimen, **wrong)},
+        **control(negative_control, specimen=replace(specimen, **wrong)),
         truth=specimen.known_force,
     )
 

@@ -15,11 +15,10 @@ from scipy.optimize import brentq, minimize_scalar
 from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
-from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
@@ -32,20 +31,14 @@ RESIDUAL = 1e-8  # [N, mm3], where forces are some 100 N
 
 Material = tuple[Effect, ...]
 Pressures = Callable[[float], float]  # [MPa] by the stretch a / A of the inner face
-Reading = tuple[
-    float, Callable[[Pressures], float]
-]  # the largest stretch, and what is read of the pressures up to there
+# The largest stretch, and a value read from the pressures up to there.
+Reading = tuple[float, Callable[[Pressures], float]]
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
     """Stretches from 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
-
-
-def sphere(element: str, n: int, degree: int) -> Cells:
-    """An octant of 3 n^2 by 2 n cells; with ``degree`` 1 they are straight."""
-    return shapes.sphere_octant(INNER, OUTER, n, 2 * n, ELEMENTS[element][0], degree)
 
 
 def slope(solved: Run) -> Chebyshev:
@@ -56,11 +49,14 @@ def slope(solved: Run) -> Chebyshev:
 
 
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
-    """A ``reading`` of the sphere whose inner face is moved out: it encloses ``pi a^3 / 6``."""
+    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, straight ones with ``degree`` 1; its inner face, which is
+    moved out, encloses ``pi a^3 / 6``.
+    """
     largest, read = reading
     grown = Prescribed("inner", "inner", (0, 1, 2), radially(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Body(sphere(element, n, degree), material, (*SYMMETRY, grown), frames)
+    mesh = shapes.sphere_octant(INNER, OUTER, n, 2 * n, ELEMENTS[element][0], degree)
+    body = Body(mesh, material, (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
     return read(lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2)))
 
@@ -73,7 +69,7 @@ def top(pressures: Pressures) -> float:
 
 def pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
-    mesh = sphere("P2/P1", n, 2)
+    mesh = shapes.sphere_octant(INNER, OUTER, n, 2 * n, "tetrahedron", 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
     body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=RESIDUAL).last
@@ -101,7 +97,7 @@ def tube_force(lab: Lab, n: int, **given: Any) -> float:
 
 
 laws, radial = find("laws"), find("radial")
-TRUE_SPHERE = find("rivlin").Sphere(MU, INNER, OUTER)
+TRUE_LAW, TRUE_SPHERE = laws.neo_hooke(MU), find("rivlin").Sphere(MU, INNER, OUTER)
 
 
 def true_pressure(law: object, stretch: float = STRETCH) -> float:
@@ -109,39 +105,18 @@ def true_pressure(law: object, stretch: float = STRETCH) -> float:
     return float(radial.sphere_pressure(law, BULK, (INNER, OUTER), stretch))
 
 
-def true_pressed() -> float:
-    """The stretch of the sphere under PRESSED."""
-    law = laws.neo_hooke(MU)
-    return float(brentq(lambda stretch: true_pressure(law, stretch) - PRESSED, 1.1, 1.7, xtol=1e-10))
-
-
-def true_fall() -> float:
-    """The difference of the largest pressure and that at BEYOND [MPa]."""
-    return float(TRUE_SPHERE.limit_point()[1] - TRUE_SPHERE.pressure(BEYOND))
-
-
 def true_tube(which: int) -> float:
     """The pressure [MPa] (0) or the force along the axis [N] (1) of the tube at STRETCH."""
-    return float(radial.tube(laws.neo_hooke(MU), BULK, (INNER, OUTER), STRETCH)[which])
+    return float(radial.tube(TRUE_LAW, BULK, (INNER, OUTER), STRETCH)[which])
 
 
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
 NEARLY_INCOMPRESSIBLE = neo_hooke(MU, NEARLY)
-STRAIGHT: dict[str, Any] = {
-    "negative_control": "straight cells, whose surfaces have flat facets",
-    "wrong": {"degree": 1},
-}
-RISING: dict[str, Any] = {
-    "negative_control": "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
-    "wrong": {"material": MOONEY_RIVLIN},
-}
-FINITE = partial(
-    Entry,
-    group="inflation",
-    relative=True,
-    kind="closed form",
-    source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py",
-)
+STRAIGHT = control("straight cells, whose surfaces have flat facets", degree=1)
+OTHER_LAW = "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising"
+RISING = control(OTHER_LAW, material=MOONEY_RIVLIN)
+INFLATED = partial(Entry, group="inflation", relative=True, kind="closed form")
+FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py")
 # Pressure at STRETCH [MPa], the largest pressure [MPa] and its stretch, and the fall from there to BEYOND [MPa].
 AT_STRETCH: Reading = (1.6, lambda pressures: pressures(STRETCH))
 LARGEST: Reading = (BEYOND, lambda pressures: pressures(top(pressures)))
@@ -149,11 +124,8 @@ WHERE_LARGEST: Reading = (BEYOND, top)
 FALL: Reading = (BEYOND, lambda pressures: pressures(top(pressures)) - pressures(BEYOND))
 CELLS = {"n": 2, "element": "Q2/Q1", "material": NEARLY_INCOMPRESSIBLE}
 LIMIT = partial(
-    Entry,
-    group="inflation",
+    INFLATED,
     measure=blown,
-    relative=True,
-    kind="closed form",
     source="Green and Zerna 1954, ch. 3; Ogden 1984, ch. 5.3.2; validation/rivlin.py Sphere",
 )
 
@@ -166,7 +138,7 @@ ENTRIES: tuple[Entry, ...] = (
             measure=blown,
             given={"reading": AT_STRETCH, "element": element, "material": NEO_HOOKE},
             **STRAIGHT,
-            truth=lambda: true_pressure(laws.neo_hooke(MU)),
+            truth=lambda: true_pressure(TRUE_LAW),
             within=within,
             because=f"discretisation of order 4, {left} cells through the wall; the polynomial of the energy adds 1e-6",
             refinement=Refinement(counts, INNER / 2, order=4),
@@ -184,8 +156,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=blown,
         given={"reading": AT_STRETCH, "n": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        negative_control="neo-Hookean material of the same shear modulus",
-        wrong={"material": NEO_HOOKE},
+        **control("neo-Hookean material of the same shear modulus", material=NEO_HOOKE),
         truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
@@ -198,9 +169,8 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=pressed,
         given={"mu": MU},
-        negative_control="the shear modulus is 1 % too large",
-        wrong={"mu": 1.01 * MU},
-        truth=true_pressed,
+        **control("the shear modulus is 1 % too large", mu=1.01 * MU),
+        truth=lambda: brentq(lambda stretch: true_pressure(TRUE_LAW, stretch) - PRESSED, 1.1, 1.7, xtol=1e-10),
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
         refinement=Refinement((1, 2), INNER / 2, order=4),
@@ -234,7 +204,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         given={**CELLS, "reading": FALL},
         **RISING,
-        truth=true_fall,
+        truth=lambda: TRUE_SPHERE.limit_point()[1] - TRUE_SPHERE.pressure(BEYOND),
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
         slow=True,
@@ -245,8 +215,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=tube_pressure,
         given={"element": "Q2/Q1"},
-        negative_control="one end of the tube is free to move along it",
-        wrong={"ends": ("bottom",)},
+        **control("one end of the tube is free to move along it", ends=("bottom",)),
         truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",

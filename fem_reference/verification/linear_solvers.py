@@ -9,7 +9,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Along, Turn
-from fem_reference.verification.parts import clamped, farthest, neo_hooke
+from fem_reference.verification.parts import clamped, control, farthest, neo_hooke
 
 # [N, mm3] that ends Newton's method; the softest motion of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
 RESIDUAL = 1e-11
@@ -38,8 +38,7 @@ LAGGED = Entry(
     unit="mm",
     measure=difference,
     given={"solver": "lagged", "precision": "double"},
-    negative_control="Newton's method ends at a residual of 1e-2 N.",
-    wrong={"residual": 1e-2},
+    **control("Newton's method ends at a residual of 1e-2 N.", residual=1e-2),
     truth=0.0,
     within=1e-9,
     because="Both end where the residual is below 1e-11 N, far below it as a rule; where the bar is softest (some 0.006 N/mm) that "

@@ -12,8 +12,17 @@ from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Turn
 from fem_reference.runs.store import Run
 from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, Specimen, stretch_entry
-from fem_reference.verification.parts import SURFACE, SYMMETRY, clamped, farthest, neo_hooke, ramp, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import (
+    SURFACE,
+    SYMMETRY,
+    clamped,
+    control,
+    farthest,
+    find,
+    neo_hooke,
+    ramp,
+    sliding,
+)
 
 loads = find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
@@ -106,8 +115,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         measure=reaction,
         given={"density": MUSCLE},
-        negative_control="The density of fat instead of muscle.",
-        wrong={"density": FAT},
+        **control("The density of fat instead of muscle.", density=FAT),
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
         because="The forces of a discrete equilibrium sum to zero whatever the mesh, but for the residual: it is 1e-10 N as a root "
@@ -121,8 +129,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm",
         measure=top,
         given={"element": "Q2"},
-        negative_control="Linear instead of quadratic elements (Q1).",
-        wrong={"element": "Q1"},
+        **control("Linear instead of quadratic elements (Q1).", element="Q1"),
         truth=lambda: loads.column_top(MU, SOFT, WEIGHT, HEIGHT),
         within=1e-8,
         relative=True,
@@ -137,8 +144,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=shrunk,
         given={"pressure": FLUID},
-        negative_control="The fluid's pressure 1 % too high.",
-        wrong={"pressure": 1.01 * FLUID},
+        **control("The fluid's pressure 1 % too high.", pressure=1.01 * FLUID),
         truth=lambda: loads.pressed_volume(COMPRESSIBLE, FLUID),
         within=1e-12,
         relative=True,
@@ -153,8 +159,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         measure=left_over,
         given={"faces": SURFACE},
-        negative_control="The top is dry.",
-        wrong={"faces": SURFACE[:-1]},
+        **control("The top is dry.", faces=SURFACE[:-1]),
         truth=0.0,
         within=1e-12,
         because="A pressure on a closed surface has no resultant, on a discrete one either, but for the residual: 1e-13 N may add "
@@ -168,8 +173,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm",
         measure=turned,
         given={"load": pressed(0.2 * MU)},
-        negative_control="A dead load of the same size.",
-        wrong={"load": dead(-0.2 * MU)},
+        **control("A dead load of the same size.", load=dead(-0.2 * MU)),
         truth=0.0,
         within=1e-10,
         because="A pressure turns with the surface, but for the residual: 1e-13 N may add up to 1e-12 N, and the block that stands "

@@ -1,30 +1,52 @@
-"""Parts of entries: materials and clamps in few words, and what is read from the states of a body."""
+"""Parts of entries: truths, negative controls, materials and constraints, and readings from the states of a body.
 
+The truths stand in ``validation/``: closed forms and published numbers, which know nothing of this package.
+"""
+
+import importlib
+import importlib.util
+import sys
 from collections.abc import Iterable
-from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry
 from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import ELEMENTS, Prescribed
 from fem_reference.problems.paths import Rest
-from fem_reference.runs.store import Run
+from fem_reference.scenes.case import HOME
 
+TRUTHS = HOME / "validation"
 SURFACE = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box
 NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
-# A property that is there (1) or not (0).
-YES = partial(
-    Entry,
-    unit="1",
-    truth=1.0,
-    within=0.1,
-    because="it is yes (1) or no (0), and nothing between",
-    kind="property",
-)
-# Loads that are gone at frame 2.
-UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
+
+
+def find(name: str) -> ModuleType:
+    """The module ``validation/<name>.py``, wherever Python looks for modules.
+
+    >>> round(find("torsion").square_bar_stiffness(1.0, 1.0), 4)
+    0.1406
+    """
+    if TRUTHS.name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(
+            TRUTHS.name, TRUTHS / "__init__.py", submodule_search_locations=[str(TRUTHS)]
+        )
+        assert spec is not None  # a file that ends in .py always has one
+        assert spec.loader is not None
+        sys.modules[TRUTHS.name] = package = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(package)
+    loaded = [str(Path(path).resolve()) for path in sys.modules[TRUTHS.name].__path__]
+    if str(TRUTHS) not in loaded:
+        raise ImportError(f'another package "{TRUTHS.name}" is loaded, from {loaded}; the truths are in {TRUTHS}')
+    return importlib.import_module(f"{TRUTHS.name}.{name}")
+
+
+def control(words: str, **wrong: object) -> dict[str, Any]:
+    """The negative control of an entry: one mistake in words, and the values with which it is made."""
+    return {"negative_control": words, "wrong": wrong}
 
 
 def ramp(full: float = 1.0) -> list[dict[str, float]]:
@@ -75,10 +97,3 @@ def farthest(points: Floats, others: Floats) -> float:
 def nearest(points: Floats, place: Iterable[float]) -> int:
     """The index of that of ``points`` (n, 3) which is nearest to a ``place`` (3,)."""
     return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))
-
-
-def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
-    """The rate [1/s] at which the top of a body, its greatest z, goes back to rest between two states, ``seconds`` apart."""
-    rest = solved.states[0].points[:, 2].max()
-    ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]
-    return float(np.log(ends[0] / ends[1])) / seconds

@@ -11,7 +11,7 @@ from fem_reference.problems.paths import Along, Matrix, Turn
 from fem_reference.runs.store import Frame
 from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
-from fem_reference.verification.parts import SURFACE, farthest, resistance
+from fem_reference.verification.parts import SURFACE, control, farthest, resistance
 
 # Of displacement: stretch, shear and a turn at once; it takes the volume to 1.2 times that at rest.
 GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
@@ -74,8 +74,7 @@ BLOCK = Entry(
     unit="mm",
     measure=turned_error,
     given={"material": NEO, "element": "Q2/Q1", "faces": SURFACE},
-    negative_control="The surface is turned 1 % further.",
-    wrong={"further": 1.01},
+    **control("The surface is turned 1 % further.", further=1.01),
     truth=0.0,
     within=1e-10,
     because=f"A turned body is a linear function of the body at rest: {LEFT}.",
@@ -94,8 +93,7 @@ ENTRIES = (
             "once: largest error of a node",
             measure=patch_error,
             given={"element": element, "degree": degree},
-            negative_control="The surface is moved 1 % too far.",
-            wrong={"share": 1.01},
+            **control("The surface is moved 1 % too far.", share=1.01),
             because=f"Linear functions are in the space of every element, on curved (isoparametric) cells too: {LEFT}.",
             source="The patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
         )

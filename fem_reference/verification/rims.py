@@ -5,7 +5,7 @@ is pulled along the bottom, by a load so small that strains are about a hundredt
 corner with the clamped half is no rim.
 """
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells
-from fem_reference.verification.parts import clamped, neo_hooke, ramp, sliding
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import clamped, control, find, neo_hooke, ramp, sliding
 
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]
@@ -23,19 +22,13 @@ LOAD = 1e-4  # [MPa]
 UNIFORM, GRADED = 1.0, 0.5  # m of h ~ r^(1 - m); 1: not graded
 
 
-@dataclass(frozen=True)
-class _Side:
-    """Points of a half of the block from those of the unit cube, crowded towards the rim x = z = 0 where ``grading`` is below 1."""
-
-    sign: float
-    depth: float
-    grading: float = 1.0
-
-    def __call__(self, unit: Floats) -> Floats:
-        """Points (n, 3) [mm]."""
-        x = unit[:, 0] if self.sign > 0 else 1 - unit[:, 0]
-        power = 1 / self.grading
-        return np.column_stack([self.sign * x**power, self.depth * unit[:, 1], unit[:, 2] ** power])
+def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
+    """Points (n, 3) [mm] of a half of the block from those of the unit cube, crowded towards the rim x = z = 0 where ``grading`` is
+    below 1.
+    """
+    x = unit[:, 0] if sign > 0 else 1 - unit[:, 0]
+    power = 1 / grading
+    return np.column_stack([sign * x**power, depth * unit[:, 1], unit[:, 2] ** power])
 
 
 def _halves(counts: shapes.Counts, grading: float) -> Cells:
@@ -43,7 +36,7 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
     blocks = []
     for sign in (-1.0, 1.0):
         faces = {"y0": "y0", "y1": "y1"} | ({"x0": "x0", "z0": "clamped"} if sign < 0 else {"x1": "pulled"})
-        blocks.append(shapes.Brick(_Side(sign, 0.5, grading), counts, faces))
+        blocks.append(shapes.Brick(partial(_side, sign, 0.5, grading), counts, faces))
     return shapes.mapped(blocks, ELEMENTS[ELEMENT][0], 1)
 
 
@@ -66,6 +59,10 @@ def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
     return Finding(found, note=", ".join(f"{value:.7g} N" for value in values))
 
 
+CONTROLS = {
+    UNIFORM: control("graded towards the rim", grading=GRADED),
+    GRADED: control("uniform meshes", grading=UNIFORM),
+}
 PLANE = "the coarsest of three meshes has 4 cells to a side: over two finer ones it is"
 SPACE = "the coarsest of three meshes has 3 cells to a side, and one along the rim, whose ends add their own error"
 
@@ -77,8 +74,7 @@ ENTRIES = tuple(
         unit="",
         measure=order,
         given={"grading": grading, "plane": name.startswith("rim_plane")},
-        negative_control="uniform meshes" if grading == GRADED else "graded towards the rim",
-        wrong={"grading": UNIFORM if grading == GRADED else GRADED},
+        **CONTROLS[grading],
         truth=float(find("rims").far_order(np.pi, 0.5, grading)),
         within=within,
         because=because,

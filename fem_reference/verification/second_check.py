@@ -11,11 +11,14 @@ from fem_reference import effects
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.assessment.run_checks import of_muscle
 from fem_reference.foundations.records import parse
+from fem_reference.geometry.rigid_bodies import Vector
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Run
 from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
+from fem_reference.verification.parts import control
 
+CORNER, FAR_SIDE = (0.0, 0.0, 0.0), (10.0, 5.0, 20.0)  # of the bar at rest [mm]; the corner is attached
 Mistake = Callable[[MuscleProblem, Run], tuple[MuscleProblem, Run]]
 
 
@@ -48,12 +51,8 @@ _SOLVED = WeakKeyDictionary[Lab, tuple[MuscleProblem, Run]]()
 
 def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
     """The bar as a muscle, and its run, which a lab makes once."""
-    if lab not in _SOLVED:
-        _SOLVED[lab] = _solve(lab)
-    return _SOLVED[lab]
-
-
-def _solve(lab: Lab) -> tuple[MuscleProblem, Run]:
+    if lab in _SOLVED:
+        return _SOLVED[lab]
     problem = bar()
     found = lab.solve(problem.body, "P2/P1", first_step=5.0)
     _, nodes = cKDTree(problem.mesh.points).query(problem.surface.points)
@@ -61,7 +60,8 @@ def _solve(lab: Lab) -> tuple[MuscleProblem, Run]:
     numbers = tuple(int(state.number) for state in found.states)
     pressures = np.array([state.scalars["contact_pressure"] for state in found.states])
     scalars = {"contact_pressure": pressures}
-    return problem, Run("bar", "fenicsx", found.outcome, numbers, problem.surface, positions, scalars=scalars)
+    _SOLVED[lab] = problem, Run("bar", "fenicsx", found.outcome, numbers, problem.surface, positions, scalars=scalars)
+    return _SOLVED[lab]
 
 
 def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
@@ -81,30 +81,20 @@ def missing(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     return problem, replace(run, positions=run.positions[:2], numbers=run.numbers[:2])
 
 
-def lost(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """A coordinate that is not a number."""
-    positions = run.positions.copy()
-    positions[2, 0, 1] = np.nan
-    return problem, replace(run, positions=positions)
+def moved(frame: int, place: Vector, by: Vector) -> Mistake:
+    """A mistake: in a frame, the vertex that is at ``place`` at rest is moved ``by`` so much [mm]."""
 
+    def mistake(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
+        positions = run.positions.copy()
+        positions[frame, (problem.surface.points == place).all(axis=1)] += by
+        return problem, replace(run, positions=positions)
 
-def off(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """An attached vertex 0.01 mm off its bone."""
-    positions = run.positions.copy()
-    positions[1, problem.attached[0].vertices[0]] += [0.01, 0.0, 0.0]
-    return problem, replace(run, positions=positions)
+    return mistake
 
 
 def pushed(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """The ball 3 mm farther than the bar was pressed: within it."""
     return replace(problem, bones=bar("5 mm").bones), run
-
-
-def folded(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """A vertex of one side of the bar 2 mm beyond the other side."""
-    positions = run.positions.copy()
-    positions[1, (run.surface.points == [10.0, 5.0, 20.0]).all(axis=1)] -= [12.0, 0.0, 0.0]
-    return problem, replace(run, positions=positions)
 
 
 ENTRIES = tuple(
@@ -115,8 +105,7 @@ ENTRIES = tuple(
         unit="1",
         measure=denials,
         given={},
-        negative_control=words,
-        wrong={"mistake": mistake},
+        **control(words, mistake=mistake),
         truth=0.0,
         within=0.5,
         because="it counts the checks that are not met",
@@ -126,9 +115,9 @@ ENTRIES = tuple(
     for name, words, mistake in (
         ("order", "two frames in each other's place", swapped),
         ("frames", "its last frame missing", missing),
-        ("finite", "a coordinate that is not a number", lost),
-        ("attached", "an attached vertex 0.01 mm off its bone", off),
+        ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
+        ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
         ("bone", "the ball 3 mm farther, within the bar", pushed),
-        ("itself", "a vertex of one side of the bar beyond the other side", folded),
+        ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
     )
 )

@@ -5,8 +5,9 @@ their rules: Gauss-Legendre in hexahedra for both, but other points in tetrahedr
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, farthest, ramp, resistance
+from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, control, farthest, ramp, resistance
 from fem_reference.verification.patch import patch
 
 
@@ -67,20 +68,12 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
     return float(np.abs(theirs - ours).max() / np.abs(ours).max())
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """A body of material that acts beside a resistance to volume change: its mesh by kind of its cells, and what is prescribed."""
-
-    acting: tuple[Effect, ...]
-    mesh: Callable[..., Cells]
-    prescribed: tuple[Prescribed, ...]
-    element: str
-
-    def body(self) -> Body:
-        """The body."""
-        acting = (*self.acting, resistance(self.element, 1.0))
-        mesh = self.mesh(kind=ELEMENTS[self.element][0])
-        return Body(mesh, acting, self.prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
+def built(
+    acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
+) -> Body:
+    """A body whose ``acting`` effects stand beside a resistance to volume change; ``mesh`` by kind of its cells."""
+    acting = (*acting, resistance(element, 1.0))
+    return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
 
 NEO_HOOKE = make("neo_hooke", mu="10 kPa")
@@ -115,37 +108,59 @@ BLOCK_RULES = (
     "they integrate by different rules, here of degree 9; this block differs by 4e-6 with those of degree 4, 1e-11 with 8 and "
     "4e-14 with 9"
 )
-# By element: the degree of both rules, the tolerance and its reason.
-RULES = {
-    "P1": (2, 1e-11, CONSTANT),
-    "P1/P1": (2, 1e-11, CONSTANT),
-    "P2": (9, 1e-11, BLOCK_RULES),
-    "P2/P0": (9, 1e-9, BAR_RULES),
-    "P2/P1": (9, 1e-10, BAR_RULES),
-    "Q1": (3, 1e-11, SAME_RULE),
-    "Q1/P0": (3, 1e-11, SAME_RULE),
-    "Q2": (5, 1e-11, SAME_RULE),
-    "Q2/Q1": (5, 1e-11, SAME_RULE),
+
+
+class Tolerance(NamedTuple):
+    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of the degree ``quadrature``, None: each
+    solver's own.
+    """
+
+    within: float
+    because: str
+    residual: float = 1e-13
+    quadrature: int | None = None
+
+
+TOLERANCES = {
+    "P1": Tolerance(1e-11, CONSTANT, 1e-14, 2),
+    "P1/P1": Tolerance(1e-11, CONSTANT, 1e-14, 2),
+    "P2": Tolerance(1e-11, BLOCK_RULES, 1e-14, 9),
+    "P2/P0": Tolerance(1e-9, BAR_RULES, 1e-14, 9),
+    "P2/P1": Tolerance(1e-10, BAR_RULES, 1e-14, 9),
+    "Q1": Tolerance(1e-11, SAME_RULE, 1e-14, 3),
+    "Q1/P0": Tolerance(1e-11, SAME_RULE, 1e-14, 3),
+    "Q2": Tolerance(1e-11, SAME_RULE, 1e-14, 5),
+    "Q2/Q1": Tolerance(1e-11, SAME_RULE, 1e-14, 5),
 }
-STEEPER = "F is constant, so that every rule is exact: Newton's residual of 1e-13 N, at forces of 0.01 to 3 N, and rounding remain"
+STEEPER = Tolerance(
+    1e-10,
+    "F is constant, so that every rule is exact: Newton's residual of 1e-13 N, at forces of 0.01 to 3 N, and rounding remain",
+)
 BENT = "bent and twisted at once"
 LEANING = "under its weight and a fluid that presses on one side, leaning on springs"
 
 
-def opinion(name: str, title: str, body: Callable[[], Body], element: str, within: float, because: str) -> Entry:
-    """An entry of a body that is solved twice, up to a residual of 1e-13 N."""
+BY_GAUSS = Tolerance(
+    1e-9,
+    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains",
+    1e-8,
+    5,
+)
+
+
+def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
+    """An entry of a body that is solved twice."""
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
         title=f"{title}, by {element}: how far FEniCSx and scikit-fem differ",
         unit="1",
         measure=agreement,
-        given={"body": body, "element": element, "residual": 1e-13, "quadrature": None},
-        negative_control="in scikit-fem the first modulus is 1 % too large",
-        wrong={"error": 0.01},
+        given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
+        **control("in scikit-fem the first modulus is 1 % too large", error=0.01),
         truth=0.0,
-        within=within,
-        because=because,
+        within=tolerance.within,
+        because=tolerance.because,
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",
     )
@@ -153,38 +168,26 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, withi
 
 def specimen(name: str, words: str, block: Specimen) -> Entry:
     """A block of the groups homogeneous, fibres or loads; ``words`` after "A block"."""
-    return opinion(name, f"A block {words}", block.body, block.element, 1e-10, STEEPER)
-
-
-def sample(name: str, title: str, body: Sample) -> Entry:
-    """A body with forces of about 1e-3 N, by the rules of its element."""
-    quadrature, within, because = RULES[body.element]
-    found = opinion(name, title, body.body, body.element, within, because)
-    return replace(found, given={**found.given, "residual": 1e-14, "quadrature": quadrature})
+    return opinion(name, f"A block {words}", block.body, block.element, STEEPER)
 
 
 ACTIVE_BLOCK = Specimen(NEO + fibres.active(0.1), "P2/P1", "pulled", MU, loads=(dead(MU),))
-PULLED_BLOCK = sample(
-    "homogeneous",
-    "A block of Mooney-Rivlin material pulled to 1.3 times its length",
-    Sample((MOONEY_RIVLIN,), SHORT_BAR, PULLED, "P2/P1"),
-)
-COOK = opinion(
-    "cook",
-    "Cook's membrane in 4 by 4 cells at a quarter of the load",
-    partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4),
-    "Q2/Q1",
-    1e-9,
-    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains",
-)
+FAMILIES = Specimen(fibres.FAMILIES, "P2/P1", "equibiaxial", 1.25)
+MUSCLE, LOADED = (NEO_HOOKE, PASSIVE, ACTIVE), (NEO_HOOKE, WEIGHT, FLUID)
+TAUT = (NEO_HOOKE, FEBIO, TENSION, PRESTRETCH)
+BENT_P1 = f"A neo-Hookean bar with a penalty on its volume, {BENT}"
+BENT_P1P1 = f"A bar of muscle whose linear pressure is stabilised, {BENT}"
+BENT_GUCCIONE = f"A bar of Guccione's heart muscle with a penalty on its volume, {BENT}"
+BENT_FAMILIES = f"A bar with two families of fibres and a penalty on its volume, {BENT}"
+BENT_TAUT = f"A bar with FEBio's fibres, which are taut at rest and pull, {BENT}"
+PULLED_BLOCK = partial(built, (MOONEY_RIVLIN,), SHORT_BAR, PULLED, "P2/P1")
+PATCH = "A patch of curved cells that is stretched, sheared and turned at once"
+COOK = "Cook's membrane in 4 by 4 cells at a quarter of the load"
+EXTENDED = "A block of Mooney-Rivlin material pulled to 1.3 times its length"
 
 ENTRIES = (
     specimen("uniaxial", "with passive fibres, stretched along them", fibres.muscle(fibres.passive(), 1.6)),
-    specimen(
-        "equibiaxial",
-        "with two families of fibres, stretched alike along two axes",
-        Specimen(fibres.FAMILIES, "P2/P1", "equibiaxial", 1.25),
-    ),
+    specimen("equibiaxial", "with two families of fibres, stretched alike along two axes", FAMILIES),
     specimen(
         "planar", "of Mooney-Rivlin material, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)
     ),
@@ -196,53 +199,23 @@ ENTRIES = (
     specimen("tension", "with fibres of constant tension, fixed short", fibres.muscle(fibres.tension(), 0.9)),
     specimen("taut", "of prestretched muscle, fixed", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
     specimen("neo_hooke", "of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
-    opinion(
-        "patch",
-        "A patch of curved cells that is stretched, sheared and turned at once",
-        partial(patch, "Q2/Q1", 2),
-        "Q2/Q1",
-        1e-10,
-        STEEPER,
+    opinion("patch", PATCH, partial(patch, "Q2/Q1", 2), "Q2/Q1", STEEPER),
+    opinion("cook", COOK, partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4), "Q2/Q1", BY_GAUSS),
+    opinion("homogeneous", EXTENDED, PULLED_BLOCK, "P2/P1", Tolerance(1e-11, CONSTANT, 1e-14, 4)),
+    *(
+        opinion(name, title, partial(built, acting, mesh, prescribed, element), element, TOLERANCES[element])
+        for name, title, acting, mesh, prescribed, element in (
+            ("bar_p2p1", f"A neo-Hookean bar {BENT}", (NEO_HOOKE,), BAR, TURNED, "P2/P1"),
+            ("bar_q1p0", f"A neo-Hookean bar {BENT}", (NEO_HOOKE,), BAR, TURNED, "Q1/P0"),
+            ("bar_p1", BENT_P1, (NEO_HOOKE,), BAR, TURNED, "P1"),
+            ("bar_p1p1", BENT_P1P1, (NEO_HOOKE, PASSIVE), BAR, TURNED, "P1/P1"),
+            ("mooney_rivlin", f"A Mooney-Rivlin bar {BENT}", (MOONEY_RIVLIN,), BAR, TURNED, "P2/P0"),
+            ("fibres", f"A bar of muscle, fibres passive and active, {BENT}", MUSCLE, BAR, TURNED, "Q1/P0"),
+            ("prestretch", BENT_TAUT, TAUT, BAR, TURNED, "Q1/P0"),
+            ("guccione", BENT_GUCCIONE, (GUCCIONE,), SHORT_BAR, TURNED, "Q2"),
+            ("holzapfel_ogden", BENT_FAMILIES, (HOLZAPFEL_OGDEN, NEO_HOOKE), BAR, TURNED, "Q1"),
+            ("loads", f"A block of curved cells {LEANING}", LOADED, CURVED_BLOCK, STANDING, "Q2/Q1"),
+            ("loads_p2", f"A block {LEANING}", LOADED, BLOCK, STANDING, "P2"),
+        )
     ),
-    replace(COOK, given={**COOK.given, "residual": 1e-8, "quadrature": 5}),
-    replace(PULLED_BLOCK, given={**PULLED_BLOCK.given, "quadrature": 4}, within=1e-11, because=CONSTANT),
-    sample("bar_p2p1", f"A neo-Hookean bar {BENT}", Sample((NEO_HOOKE,), BAR, TURNED, "P2/P1")),
-    sample("bar_q1p0", f"A neo-Hookean bar {BENT}", Sample((NEO_HOOKE,), BAR, TURNED, "Q1/P0")),
-    sample(
-        "bar_p1",
-        f"A neo-Hookean bar with a penalty on its volume, {BENT}",
-        Sample((NEO_HOOKE,), BAR, TURNED, "P1"),
-    ),
-    sample(
-        "bar_p1p1",
-        f"A bar of muscle whose linear pressure is stabilised, {BENT}",
-        Sample((NEO_HOOKE, PASSIVE), BAR, TURNED, "P1/P1"),
-    ),
-    sample("mooney_rivlin", f"A Mooney-Rivlin bar {BENT}", Sample((MOONEY_RIVLIN,), BAR, TURNED, "P2/P0")),
-    sample(
-        "fibres",
-        f"A bar of muscle, fibres passive and active, {BENT}",
-        Sample((NEO_HOOKE, PASSIVE, ACTIVE), BAR, TURNED, "Q1/P0"),
-    ),
-    sample(
-        "prestretch",
-        f"A bar with FEBio's fibres, which are taut at rest and pull, {BENT}",
-        Sample((NEO_HOOKE, FEBIO, TENSION, PRESTRETCH), BAR, TURNED, "Q1/P0"),
-    ),
-    sample(
-        "guccione",
-        f"A bar of Guccione's heart muscle with a penalty on its volume, {BENT}",
-        Sample((GUCCIONE,), SHORT_BAR, TURNED, "Q2"),
-    ),
-    sample(
-        "holzapfel_ogden",
-        f"A bar with two families of fibres and a penalty on its volume, {BENT}",
-        Sample((HOLZAPFEL_OGDEN, NEO_HOOKE), BAR, TURNED, "Q1"),
-    ),
-    sample(
-        "loads",
-        f"A block of curved cells {LEANING}",
-        Sample((NEO_HOOKE, WEIGHT, FLUID), CURVED_BLOCK, STANDING, "Q2/Q1"),
-    ),
-    sample("loads_p2", f"A block {LEANING}", Sample((NEO_HOOKE, WEIGHT, FLUID), BLOCK, STANDING, "P2")),
 )

@@ -1,8 +1,15 @@
-"""A block squeezed between plates: smooth ones, to a tenth of its height and back, and glued ones, until its corners fold over.
+"""A block squeezed between plates: smooth ones, to a tenth of its height and back or until it collapses, and glued ones, until its
+corners fold over.
 
 Smooth plates leave every state homogeneous, also below half the height, where it is unstable: Newton's method follows it, as
 nothing on a structured mesh disturbs it. On the return path a load step that is too large finds another state at rest: the block
 turned by half a turn, through its planes of symmetry. It is not taken, as det F falls to 0 on the straight way there.
+
+Where the bulk modulus is low, no state near the rest volume is left at some height. An isochoric neo-Hookean energy pulls at the
+volume, which the law ``K/2 (J - 1)^2`` cannot keep: its pressure is K at most. Free at its sides the block is in balance where
+``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. But for ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
+right side is 0.326 K at most, at J = 2/5: below a stretch of some mu/K the only state left is one near ``J = stretch^3``, a block
+that has shrunk alike along all axes, without shear and without force on the plate.
 """
 
 from functools import partial
@@ -13,26 +20,39 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine
 from fem_reference.runs.store import Frame, Run
-from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, YES, clamped, farthest, frames, neo_hooke
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, control, farthest, find, frames, neo_hooke
 
+loads = find("loads")
 MU = 0.01  # [MPa]
-HEIGHT = 0.1  # of the squeezed block over that at rest
+HEIGHT = 0.1  # of the squeezed block over that at rest: one that collapses has a thousandth of its volume there
 STEPS = 5  # in each direction
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
+POISSON = 0.3  # of a block that collapses
+# On the branch of states near rest, which falls steeply here: from 0.59 of the volume to 0.42.
+STRETCHES = (1.0, 0.8, 0.6, 0.5, 0.45, 0.43, 0.425, 0.42, 0.415, 0.41, 0.405, 0.4)
+LOWEST = 0.5  # V/V0 of the range of the law
+
+
+def bulk_modulus(poisson: float) -> float:
+    """The bulk modulus [MPa] of a material of the shear modulus ``MU`` [MPa]."""
+    return 2 * MU * (1 + poisson) / (3 * (1 - 2 * poisson))
+
+
+def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[float, ...], **settings: Any) -> Run:
+    """The states of an eighth of a cube, free at its sides, whose smooth plate follows a ``path``, at the frames ``numbers``."""
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
+    body = Body(mesh, neo_hooke(MU, bulk, element), (*SYMMETRY, Prescribed("plate", "z1", (2,), path)), numbers)
+    return lab.solve(body, element, smallest_step=1e-3, residual=RESIDUAL, **settings)
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of an eighth of a cube there and as much of the way ``back``: at even steps, or where they are ``growing`` at the
-    ends of both paths.
+    """All states of the block there and as much of the way ``back``: at even steps, or where they are ``growing`` at the ends of
+    both paths.
     """
-    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
-    plate = Prescribed("plate", "z1", (2,), path)
-    body = Body(mesh, neo_hooke(MU, bulk), (*SYMMETRY, plate), frames(2, 2 if growing else 2 * STEPS))
     # Every state by Newton's method, those of the return path too.
-    solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL, reuse=False)
+    solved = plated(lab, element, bulk, path, frames(2, 2 if growing else 2 * STEPS), first_step=0.05, reuse=False)
     return (*solved.states[:-1], solved.last)
 
 
@@ -60,6 +80,38 @@ def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool, ba
     """The largest distance of a node from rest [mm] when the plate is as much of the way ``back``."""
     states = smooth(lab, element, bulk, growing=growing, back=back)
     return _finding(farthest(states[-1].points, states[0].points), states)
+
+
+def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...]) -> Run:
+    """The states of the block at ``stretches`` of its height, the first of which is 1."""
+    numbers = tuple(1 - stretch for stretch in stretches)
+    path = Affine(NO_GRADIENT, (0.0, 0.0, -1.0))
+    return plated(lab, element, bulk_modulus(poisson), path, numbers, first_step=0.1)
+
+
+def collapses(lab: Lab, element: str, poisson: float) -> Finding:
+    """1 where the squeeze does not come through, keeps no state below a fifth of its volume, and names the law that was
+    outside its range; else 0. Newton's method finds a collapsed state or, on the steep branch towards it, which folds back, none.
+    """
+    solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
+    least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
+    ended = solved.outcome.status in ("collapsed", "diverged", "limit point")
+    message = solved.outcome.message
+    found = ended and least >= 0.2 and "incompressible is outside the range" in message
+    return Finding(float(found), note=f"{solved.outcome.status}: {message}")
+
+
+def outside(lab: Lab, element: str, poisson: float) -> Finding:
+    """The number of states in which a law is outside its range."""
+    solved = squeezed(lab, element, poisson, STRETCHES)
+    found = sum(state.scalars["outside_law"] > 0 for state in (*solved.states[:-1], solved.last))
+    return Finding(float(found), note=solved.outcome.message)
+
+
+def known_outside() -> int:
+    """The number of states with less than the ``LOWEST`` volume."""
+    volume = partial(loads.squeezed_volume, MU, bulk_modulus(POISSON))
+    return sum(volume(stretch) < LOWEST for stretch in STRETCHES)
 
 
 def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Run:
@@ -96,8 +148,12 @@ def stays_upright(lab: Lab, element: str, count: int, height: float, **settings:
     return Finding(float(solved.outcome.status == "converged" and smallest > 0), note=_end_note(solved, height))
 
 
-loads = find("loads")
 EXACT = "the state is homogeneous, so that every element has it: Newton's residual of 1e-11 N and rounding remain"
+BALANCE = "validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)"
+# A property that is there (1) or not (0).
+YES = partial(
+    Entry, unit="1", truth=1.0, within=0.1, because="it is yes (1) or no (0), and nothing between", kind="property"
+)
 SMOOTH = partial(
     Entry,
     group="squeeze",
@@ -105,14 +161,36 @@ SMOOTH = partial(
     within=1e-10,
     because=EXACT,
     kind="closed form",
-    source="validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)",
+    source=BALANCE,
 )
-GLUED = partial(
-    YES,
-    group="squeeze",
-    source="det F above zero everywhere, or material would go through itself",
-)
+UPRIGHT = "det F above zero everywhere, or material would go through itself"
+GLUED = partial(YES, group="squeeze", source=UPRIGHT)
+
 ENTRIES: tuple[Entry, ...] = (
+    YES(
+        name="collapse_is_no_result",
+        group="collapse",
+        title="Squeezed to a tenth of its height, a block of the Poisson ratio 0.3 is no result, and its law is named, by P2/P1",
+        measure=collapses,
+        given={"element": "P2/P1", "poisson": POISSON},
+        **control("a Poisson ratio of 0.499, with which 0.993 of the volume are kept", poisson=0.499),
+        source="validation/loads.py: the only state in balance has a thousandth of the volume, which no flesh has",
+    ),
+    Entry(
+        name="law_outside_its_range",
+        group="collapse",
+        title="In how many states of a squeeze, from 1 to 0.4 of the height, less than half of the volume is left, by Q1/P0",
+        unit="1",
+        measure=outside,
+        given={"element": "Q1/P0", "poisson": POISSON},
+        negative_control="a Poisson ratio of 0.32",
+        wrong={"poisson": 0.32},  # with which the volume stays above a half
+        truth=known_outside,
+        within=0.1,
+        because="it is a number of states, each of them homogeneous, so that every element has it",
+        kind="closed form",
+        source=BALANCE,
+    ),
     *(
         SMOOTH(
             name=f"squeeze_force_k{power}",
@@ -143,8 +221,7 @@ ENTRIES: tuple[Entry, ...] = (
             unit="mm",
             measure=distance_from_rest,
             given={"element": element, "bulk": bulk, "growing": growing},
-            negative_control="the plates stop a thousandth of their way before they are back",
-            wrong={"back": 0.999},
+            **control("the plates stop a thousandth of their way before they are back", back=0.999),
             truth=0.0,
             because=f"{EXACT}; of an elastic body nothing remembers the squeeze",
             kind="property",
@@ -161,24 +238,21 @@ ENTRIES: tuple[Entry, ...] = (
         title="Squeezed to 0.4 of its height between plates that it sticks to, Q1/P0 folds over at its corners, as reported",
         measure=inverts,
         given={"element": "Q1/P0", "count": 4, "height": GLUED_TO},
-        negative_control="squeezed to 0.7 of its height only",
-        wrong={"height": 0.7},
-        source="det F above zero everywhere, or material would go through itself; Newton's method does not see it at a vertex",
+        **control("squeezed to 0.7 of its height only", height=0.7),
+        source=f"{UPRIGHT}; Newton's method does not see it at a vertex",
     ),
     GLUED(
         name="bonded_squeeze_stays_upright",
         title="Squeezed to 0.7 of its height between plates that it sticks to, Q2/Q1 keeps det F above zero everywhere",
         measure=stays_upright,
         given={"element": "Q2/Q1", "count": 2, "height": 0.7},
-        negative_control="squeezed to 0.4 of its height",
-        wrong={"height": GLUED_TO},
+        **control("squeezed to 0.4 of its height", height=GLUED_TO),
     ),
     GLUED(
         name="bonded_squeeze_with_vertices",
         title="Squeezed to 0.4 of its height between plates that it sticks to, P2/P1 keeps det F above zero everywhere",
         measure=stays_upright,
         given={"element": "P2/P1", "count": 2, "height": GLUED_TO},
-        negative_control="a rule of quadrature of degree 4, which has no points at the vertices",
-        wrong={"quadrature_degree": 4},
+        **control("a rule of quadrature of degree 4, which has no points at the vertices", quadrature_degree=4),
     ),
 )

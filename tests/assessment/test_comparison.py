@@ -1,4 +1,4 @@
-"""A comparison measures every run against the reference and against rest, and judges what it was asked to judge."""
+"""A comparison measures every run against the reference and against rest, and judges it; over fewer frames too."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.assessment.comparison import compare
+from fem_reference.assessment.comparison import compare, reached, reached_frames
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes.case import Expectation
+from tests.report.comparisons import NAN, small_comparison, with_bars
 
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
@@ -108,3 +109,40 @@ def test_expectations_of_the_reference_and_of_candidates_have_bars_of_their_own(
 def test_a_reference_carries_the_fibres() -> None:
     with pytest.raises(InputError, match="reference: fibres: got a run without an interior"):
         compare(scene(), SETUP, run("reference", (1, 1.1), fibres=False), ())
+
+
+@pytest.fixture
+def whole(tmp_path, monkeypatch):
+    return with_bars(small_comparison(tmp_path, monkeypatch))
+
+
+def failed(whole, *lost: int):
+    positions = np.array(whole.reference.positions)
+    positions[list(lost)] = NAN
+    return replace(whole, reference=replace(whole.reference, positions=positions, outcome=Outcome("diverged", "lost")))
+
+
+def test_frames_that_were_not_reached_are_left_out_everywhere(whole) -> None:
+    cut = reached(failed(whole, 1, 4))
+    assert {run.numbers for run in cut.runs} == {(0, 20, 30)}
+    assert cut.error_bars.numbers == (0, 20, 30)
+    np.testing.assert_array_equal(cut.candidates[0].positions, whole.candidates[0].positions[[0, 2, 3]])
+    for name, metric, statistic in (("quick", "volume", "deviation"), ("reference", "fibre_length", "max")):
+        before, after = whole[name, metric, statistic], cut[name, metric, statistic]
+        np.testing.assert_array_equal(after.values, before.values[[0, 2, 3]])
+        np.testing.assert_array_equal(after.error_bars, before.error_bars[[0, 2, 3]])
+        assert after.numbers == (0, 20, 30)
+    assert cut["quick", "fibre_length", "max"].where == tuple(
+        whole["quick", "fibre_length", "max"].where[i] for i in (0, 2, 3)
+    )
+    np.testing.assert_array_equal(cut.extension_error.values, whole.extension_error.values[[0, 2, 3]])
+    for before, after in zip(whole.error_bars.bars, cut.error_bars.bars, strict=True):
+        np.testing.assert_array_equal(after.values, before.values[[0, 2, 3]])
+        np.testing.assert_array_equal(after.model, before.model[[0, 2, 3]])
+
+
+def test_a_reference_that_reached_all_or_nothing_is_left_as_it_is(whole) -> None:
+    assert reached(whole) is whole
+    nowhere = failed(whole, *range(5))
+    assert reached(nowhere) is nowhere
+    assert len(reached_frames(nowhere.reference)) == 0

@@ -1,4 +1,4 @@
-"""Pass, fail and inconclusive; and that what is expected is read strictly."""
+"""Pass, fail and inconclusive, expectations read strictly, and reasons to doubt a reference, each from its own run."""
 
 import math
 from functools import partial
@@ -7,12 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem_reference.assessment.judge import MET, check, doubted, judge, overall, resolved, verdict
+from fem_reference.assessment.judge import MET, check, doubted, doubts, judge, overall, resolved, verdict
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.limits import ENERGY_GAP
+from fem_reference.foundations.mesh import Surface
 from fem_reference.metrics import Measure
+from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes.case import Expectation
 
 NUMBERS = (0, 10, 20)
+TRIANGLE = Surface(np.eye(3), np.array([[0, 1, 2]]))
 
 
 def expectation(**changes) -> Expectation:
@@ -169,3 +173,39 @@ def test_a_metric_with_one_number_needs_no_statistic_and_no_unit() -> None:
         InputError, match=r'expect\[0\]: metric and statistic: got "volume", want one of .*volume.deviation'
     ):
         checked(statistic=None)
+
+
+def reference(status: str = "converged", **scalars: list[float]) -> Run:
+    values = {name: np.array(each) for name, each in scalars.items()}
+    positions = np.broadcast_to(TRIANGLE.points, (3, 3, 3))
+    return Run("reference", "fenicsx", Outcome(status, ""), (0, 10, 20), TRIANGLE, positions, scalars=values)
+
+
+def test_a_run_that_recorded_nothing_wrong_is_not_doubted() -> None:
+    assert doubts(reference()) == []
+    fine = {"negative_modes": [0, np.nan, 0], "min_det_F": [1, 0.5, 0.11], "outside_law": [0, 0, np.nan]}
+    assert doubts(reference(**fine, energy_gap=[0, 0.9 * ENERGY_GAP, np.nan])) == []
+
+
+@pytest.mark.parametrize(
+    ("scalars", "why"),
+    [
+        ({"negative_modes": [0, 1, 2]}, "unstable equilibrium in 2 of 3 frames"),
+        ({"min_det_F": [1, 0.5, 0.2], "min_det_F_quadrature": [1, 0.05, 0.4]}, "det F falls to 0.0500"),
+        (
+            {"outside_law": [0, 1, 1]},
+            "cells are outside the range that a law is meant for in 2 of 3 frames, first in 10",
+        ),
+        ({"energy_gap": [0, -0.135, 0.1]}, "-13.5 % of the energy without work at frame 10"),
+    ],
+)
+def test_each_reason_says_where(scalars: dict[str, list[float]], why: str) -> None:
+    (found,) = doubts(reference(**scalars))
+    assert found.startswith(why)
+
+
+def test_what_ended_early_and_is_unstable_has_both_reasons() -> None:
+    assert doubts(reference("timed out", negative_modes=[1, 0, 0])) == [
+        "timed out",
+        "unstable equilibrium in 1 of 3 frames",
+    ]

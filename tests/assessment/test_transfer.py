@@ -1,4 +1,4 @@
-"""Settings that are good on some cases, tried on the case that was left out."""
+"""Settings that are the same on several cases, and good ones of some cases on the case that was left out."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from studied import COST, ERROR, point
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.transfer import transfers
+from fem_reference.assessment.transfer import is_elsewhere, setting, tetrahedra, transfers
 
 
 def studies(points: list[Point]) -> list[CaseStudy]:
@@ -82,3 +82,39 @@ def test_a_value_of_the_scene_itself_is_no_setting_of_another_case() -> None:
         for case in "abc"
     ]
     assert transfers(studies(softer), ERROR) == ()
+
+
+def chosen(**choice) -> Point:
+    return Point("bar", "fenicsx", "fenicsx", "knob", "value", {"solver": "fenicsx"} | choice, "converged", "")
+
+
+def sized(tet_size: float, refinements: float) -> CaseStudy:
+    features = {"tet_size": tet_size, "refinements": refinements}
+    return CaseStudy("bar", "A bar", "its reference", (), {}, {}, (), 100, 1.0, features)
+
+
+def on(size: float, refinements: int) -> Point:
+    return chosen(scene={"muscle.tet_size": f"{size} mm", "muscle.refinements": refinements})
+
+
+def test_tetrahedra_count_by_their_size_in_that_of_the_case() -> None:
+    assert tetrahedra(on(12.0, 0), sized(6.0, 1.0)) == (2.0, 1.0)
+    assert setting(on(12.0, 0), sized(6.0, 1.0)) == setting(on(8.0, 1), sized(4.0, 2.0))
+    assert setting(on(12.0, 0), sized(6.0, 1.0)) != setting(on(12.0, 0), sized(4.0, 1.0))
+
+
+def test_values_of_a_scene_are_its_own_but_for_its_mesh() -> None:
+    assert is_elsewhere(chosen(iterations=4))
+    assert is_elsewhere(on(8.0, 1))
+    assert is_elsewhere(chosen(scene={"triangles": "4 times"}))
+    own = chosen(scene={"effect[0].mu": "10 kPa"})
+    assert not is_elsewhere(own)
+    assert setting(own, sized(6.0, 1.0)) == "bar: knob = value"
+
+
+def test_settings_are_named_in_one_order() -> None:
+    one, other = chosen(iterations=4, first=1.0), chosen(first=1.0, iterations=4)
+    assert setting(one, sized(6.0, 1.0)) == setting(other, sized(4.0, 1.0)) == "fenicsx: first = 1.0, iterations = 4"
+    assert setting(chosen(scene={"triangles": "4 times"}), sized(6.0, 1.0)).startswith(
+        "fenicsx: 4 times as many triangles"
+    )

@@ -5,9 +5,9 @@ import argparse
 import pytest
 
 from fem_reference import cli
-from fem_reference.cli import parser
+from fem_reference.cli._parser import names, parser, verb
 
-VERBS = cli.names()
+VERBS = names()
 
 
 def options_of(name: str) -> argparse.ArgumentParser:
@@ -18,11 +18,11 @@ def options_of(name: str) -> argparse.ArgumentParser:
 
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_has_what_the_command_line_asks_for(name: str) -> None:
-    verb = cli.verb(name)
-    assert verb.HELP.strip()
-    assert not verb.HELP.endswith(".")
-    assert callable(verb.run)
-    assert verb.__doc__.startswith(f"The verb ``{name}``: ")
+    module = verb(name)
+    assert module.HELP.strip()
+    assert not module.HELP.endswith(".")
+    assert callable(module.run)
+    assert module.__doc__.startswith(f"The verb ``{name}``: ")
 
 
 @pytest.mark.parametrize("name", VERBS)

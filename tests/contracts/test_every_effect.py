@@ -33,7 +33,7 @@ from acting import (
 from fem_reference import effects
 from fem_reference.effects import Energy, FieldEffect, FieldState, Load, Place, Prestrain, State
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.functions import Numpy
+from fem_reference.foundations.material_point import NUMPY
 from fem_reference.foundations.records import parse
 
 HERE = Place((0.3, 0.7), vars(np), 0.25)
@@ -199,7 +199,7 @@ class SymbolFunctions:
     """``Functions`` of symbols and numbers."""
 
     exp, log, sqrt, cos, sin, above = (
-        staticmethod(lifted(getattr(Numpy, name))) for name in ("exp", "log", "sqrt", "cos", "sin", "above")
+        staticmethod(lifted(getattr(NUMPY, name))) for name in ("exp", "log", "sqrt", "cos", "sin", "above")
     )
 
 

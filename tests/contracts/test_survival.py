@@ -24,10 +24,9 @@ from fem_reference.export.folders import new_folder
 from fem_reference.foundations import subprocesses
 from fem_reference.io import files
 from fem_reference.report import stress_page
-from fem_reference.runs import cut_off
 from fem_reference.runs.states import write_arrays
 from fem_reference.runs.store import Frame, Run
-from fem_reference.runs.writer import Writer
+from fem_reference.runs.writer import RESTART, Writer
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import jobs
 from fem_reference.studies.execution import Bench
@@ -98,7 +97,7 @@ def test_a_run_that_was_cut_off_goes_on(kind: str, tmp_path: Path, monkeypatch: 
     assert kills.differences(whole, ended) == []
     for name in ("newton_iterations", "load_steps", "cut_backs"):
         assert ended.outcome.cost[name] == whole.outcome.cost[name]
-    assert not (ended.folder / cut_off.FOLDER).exists()  # type: ignore[operator]
+    assert not (ended.folder / RESTART).exists()  # type: ignore[operator]
 
 
 @pytest.mark.slow

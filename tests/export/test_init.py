@@ -13,8 +13,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.problems import muscle
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.report import pages
-from fem_reference.runs.reached import seconds_per_frame
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Outcome, Run, seconds_per_frame
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded

@@ -5,10 +5,10 @@ import pytest
 from acting import ENERGIES, FIBRE, deformations, make
 
 from fem_reference.effects import State
-from fem_reference.foundations.functions import Numpy
-from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
+from fem_reference.foundations.jets import JET_FUNCTIONS, Jet, constant, variables
+from fem_reference.foundations.material_point import NUMPY
 
-FUNCTIONS = JetFunctions()
+FUNCTIONS = JET_FUNCTIONS
 X = np.linspace(0.3, 1.7, 5)
 # Each function of one variable beside its value and derivatives by hand.
 BY_HAND = {
@@ -90,7 +90,7 @@ def test_stress_and_stiffness_of_every_energy(name) -> None:
         return Jet(found.value * ones, found.slope * ones, found.curvature * ones)
 
     exact, step = jet(here), 1e-6
-    assert exact.value == pytest.approx(at(here, Numpy()), rel=1e-12, abs=1e-14)
+    assert exact.value == pytest.approx(at(here, NUMPY), rel=1e-12, abs=1e-14)
     for i in range(13):
         move = step * np.eye(13)[i][:, None]
         late, early = jet(here + move), jet(here - move)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from fem_reference.foundations.material_point import State
+from fem_reference.foundations.material_point import NUMPY, State
 
+X = np.array([0.2, 1.0, 3.0])
 F = np.eye(3) + np.random.default_rng(4).uniform(-0.3, 0.3, (3, 3))
 
 
@@ -37,3 +38,13 @@ def test_the_fibre_stretch_has_no_share_in_a_change_of_volume() -> None:
 @pytest.mark.parametrize(("x", "found"), [(-3.0, 1.0), (1.5, 1.5), (9.0, 2.0)])
 def test_a_value_stays_between_its_bounds(x, found) -> None:
     assert State(F=np.eye(3).tolist()).between(1.0, 2.0, x) == found
+
+
+def test_functions_are_inverse_to_each_other() -> None:
+    assert NUMPY.log(NUMPY.exp(X)) == pytest.approx(X)
+    assert NUMPY.sqrt(X) ** 2 == pytest.approx(X)
+    assert NUMPY.cos(X) ** 2 + NUMPY.sin(X) ** 2 == pytest.approx(np.ones(3))
+
+
+def test_above_is_strict_and_takes_arrays() -> None:
+    assert NUMPY.above(X, 1.0, 10 * X, -X).tolist() == [-0.2, -1.0, 30.0]

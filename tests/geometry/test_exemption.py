@@ -45,7 +45,8 @@ def test_a_coarse_surface_is_exempt_where_a_fine_one_is(cells) -> None:
     assert (by == (points[:, 2] > 20)).all()
 
 
-@pytest.mark.parametrize("cells", LEVELS)
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", LEVELS[::3])
 def test_its_area_is_that_of_the_rims(cells) -> None:
     # Two strips of 40 mm by the reach, of 1600 mm2. Points of the skin stand for areas of 0.5 mm across, as wide as the strips: two
     # fifths of them may fall on the other side.
@@ -59,6 +60,7 @@ def test_its_area_is_that_of_the_rims(cells) -> None:
     assert_allclose(1600 - fine.areas.sum(), strips, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_on_a_round_body_it_converges_as_the_surface_is_refined() -> None:
     # A cap of a ball is attached up to 60 degrees. With the reach that is a cap up to 60 degrees + reach / radius, but for straight
     # distances beside arcs, by (reach / radius)^2 / 24. Triangles end the attachment half an edge off on average.

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.intersections import crossings
-from fem_reference.geometry.penetrations import ClosedSurface, Depths, depths
+from fem_reference.geometry.penetrations import Depths, depths, depths_within
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.geometry.tessellation import tessellated
 
@@ -25,7 +25,7 @@ def posed(*shift: float) -> np.ndarray:
 
 def test_depths_in_a_ball_are_its_radius_less_the_distance_from_the_middle() -> None:
     points = np.random.default_rng(2).normal(size=(500, 3)) * 5
-    found = ClosedSurface(BODY).depths(points)
+    found = depths_within(BODY, points)
     true = np.maximum(10 - np.linalg.norm(points, axis=1), 0)
     assert found == pytest.approx(true, abs=0.1)
     assert (found <= true + 1e-9).all()
@@ -33,20 +33,20 @@ def test_depths_in_a_ball_are_its_radius_less_the_distance_from_the_middle() -> 
 
 @pytest.mark.parametrize("apart", [9.0, 12.0, 13.9])
 def test_two_balls_are_as_deep_as_their_radii_are_more_than_apart(apart: float) -> None:
-    deep, place = depths(ClosedSurface(BODY), BONE, BALL, posed(apart, 0, 0)).deepest()
+    deep, place = depths(BODY, BONE, BALL, posed(apart, 0, 0)).deepest()
     assert deep == pytest.approx(14 - apart, abs=0.15)
     assert place[0] == pytest.approx(10 if apart > 10 else apart - 4, abs=2)
 
 
 def test_a_bone_within_the_body_is_found_where_no_surfaces_cross() -> None:
     # Of its vertices the nearest to the middle of the body is 1 mm beyond it.
-    deep, place = depths(ClosedSurface(BODY), BONE, BALL, posed(0, 0, 3)).deepest()
+    deep, place = depths(BODY, BONE, BALL, posed(0, 0, 3)).deepest()
     assert deep == pytest.approx(9, abs=0.2)
     assert np.linalg.norm(place) == pytest.approx(1, abs=0.1)
 
 
 def test_nothing_is_deep_where_they_are_apart() -> None:
-    found = depths(ClosedSurface(BODY), BONE, BALL, posed(14.1, 0, 0))
+    found = depths(BODY, BONE, BALL, posed(14.1, 0, 0))
     assert found.deepest()[0] == 0
     assert found.deepest(found)[0] == 0
 
@@ -54,7 +54,7 @@ def test_nothing_is_deep_where_they_are_apart() -> None:
 def test_a_half_space_is_entered_as_deep_as_the_body_reaches_below_it() -> None:
     plane = HalfSpace((0, 0, -7), (0, 0, 1))
     slab = tessellated(plane, BODY.points, "plane")
-    deep, place = depths(ClosedSurface(BODY), slab, plane, np.eye(4)).deepest()
+    deep, place = depths(BODY, slab, plane, np.eye(4)).deepest()
     assert deep == pytest.approx(3, abs=1e-9)
     assert place[2] == pytest.approx(-10)
 
@@ -71,7 +71,7 @@ STILL = np.eye(4)
 
 def deepest(body: Surface, radius: float, at) -> float:
     surface, form = ball(radius, at)
-    return depths(ClosedSurface(body), surface, form, STILL).deepest()[0]
+    return depths(body, surface, form, STILL).deepest()[0]
 
 
 @pytest.mark.parametrize("at", [-3.0, -2.0, -1.0, 0.0, 1.5])
@@ -93,7 +93,7 @@ def test_a_thin_needle_between_the_vertices_of_a_coarse_block_is_found_all_along
     turned = needle.moved_to(needle.points[:, [2, 0, 1]] + [-5.0, 3.3, 17.7])
     low, high = turned.points.min(axis=0), turned.points.max(axis=0)
     form = Box(tuple((low + high) / 2), tuple(high - low), 0.0)
-    found, place = depths(ClosedSurface(BLOCK), turned, form, STILL).deepest()
+    found, place = depths(BLOCK, turned, form, STILL).deepest()
     # The nearest side of the block: y = 0 from 3.3, or the way back along x.
     assert_allclose(found, 3.4, atol=0.2)
     assert place[0] > 3.0

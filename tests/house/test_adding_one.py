@@ -1,5 +1,7 @@
 """One of each kind is added to a copy of the project, in one new file or folder: list, contract and verb find it."""
 
+import collections
+import re
 import shutil
 import subprocess
 import sys
@@ -20,12 +22,14 @@ FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests", "examples"
 
 
 class New(NamedTuple):
-    """A new thing: its file, or all files of its folder, by path in the project, and commands with what they must print.
+    """A new thing: its file, or all files of its folder, by path in the project; files of tests, with the least number of tests in
+    each that ask it; and commands with what they must print.
 
     A command is the words after ``python -m``; one that begins with ``!`` must fail.
     """
 
     files: dict[str, str | bytes]
+    tested: dict[str, int]
     seen: dict[str, str]
 
 
@@ -181,7 +185,7 @@ VERB = '''
 
 import argparse
 
-from fem_reference.cli._printing import DONE, write_output
+from fem_reference.cli import DONE, write_output
 from fem_reference.scenes import casefile
 
 HELP = "how many cases there are"
@@ -202,90 +206,105 @@ def run(options: argparse.Namespace) -> int:
 KINDS = {
     "verb": New(
         {"fem_reference/cli/own_verb.py": VERB},
+        {"tests/cli/test_verbs.py": 3},
         {
             "fem_reference --help": "how many cases there are",
             "fem_reference own_verb": " cases",
             "fem_reference own_verb --names --quiet": "hip_flexion",
             "!fem_reference own_verb --no-such-option": "--no-such-option",
-            "pytest -q tests/cli/test_verbs.py -k own_verb": "3 passed",
         },
     ),
     "effect": New(
         {"fem_reference/effects/own_effect.py": EFFECT},
-        {
-            "pytest -q tests/contracts/test_every_effect.py -k own_effect": "8 passed",
-            "pytest -q tests/export/test_open_formats.py -k own_effect": "1 passed",
-        },
+        {"tests/contracts/test_every_effect.py": 8, "tests/export/test_open_formats.py": 1},
+        {},
     ),
     "metric": New(
         {"fem_reference/metrics/own_metric.py": METRIC},
+        {"tests/metrics/test_init.py": 2, "tests/contracts/test_every_metric.py": 2},
         {
             "fem_reference list": "own_metric",
-            "pytest -q tests/metrics/test_init.py -k own_metric": "2 passed",
-            "pytest -q tests/contracts/test_every_metric.py -k zero": "2 passed",
         },
     ),
     "solver": New(
         {"fem_reference/solvers/own_solver.py": SOLVER},
+        {"tests/contracts/test_every_solver.py": 1, "tests/solvers/test_init.py": 1},
         {
             "fem_reference list": "own_solver",
-            "pytest -q tests/contracts/test_every_solver.py -k own_solver": "passed",
-            "pytest -q tests/solvers/test_init.py": "passed",
         },
     ),
     "verification entry": New(
         {"fem_reference/verification/own_entry.py": ENTRY},
+        {"tests/contracts/test_every_entry.py": 3},
         {
             "fem_reference verify own --quiet": "verdict: pass, 1 of 1 pass",
             "!fem_reference verify --negative-control own_entry --quiet": "fail (negative control)",
-            "pytest -q tests/contracts/test_every_entry.py -k own_entry": "3 passed",
         },
     ),
     "mesh": New(
         folder("meshes/box", "meshes/own_mesh"),
-        {"pytest -q tests/contracts/test_every_mesh.py -k own_mesh": "passed"},
+        {"tests/contracts/test_every_mesh.py": 1},
+        {},
     ),
     "case": New(
         folder("cases/rod", "cases/own_case", {"rod": "own rod"}),
+        {"tests/contracts/test_every_case.py": 1},
         {
             "fem_reference list": "own_case",
             "fem_reference run own_case --solver listing --quiet": "pass: listing nodal_error",
-            "pytest -q tests/contracts/test_every_case.py -k own_case": "passed",
         },
     ),
     "example": New(
         {"examples/own_example.py": EXAMPLE},
-        {"pytest -q tests/house/test_examples.py -k own_example": "1 passed"},
+        {"tests/house/test_examples.py": 1},
+        {},
     ),
     "truth": New(
         {"validation/own_truth.py": TRUTH},
-        {"pytest -q tests/verification/test_truths.py -k own_truth": "1 passed"},
+        {"tests/verification/test_parts.py": 1},
+        {},
     ),
 }
 
 
-@pytest.fixture
-def copy(tmp_path: Path) -> Path:
-    """A copy of the project."""
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project with one more of each kind, each in one file or one folder."""
+    target = tmp_path_factory.mktemp("copy")
     for name in FOLDERS:
-        shutil.copytree(PROJECT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(PROJECT / "pyproject.toml", tmp_path)
-    return tmp_path
+        shutil.copytree(PROJECT / name, target / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(PROJECT / "pyproject.toml", target)
+    for new in KINDS.values():
+        assert len(new.files) == 1 or len({Path(name).parent for name in new.files}) == 1
+        for name, content in new.files.items():
+            path = target / name
+            assert not path.exists()
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return target
+
+
+def printed_by(words: list[str], copy: Path) -> tuple[int, str]:
+    """Status and output of ``python -m`` with more words, in the copy."""
+    line = [sys.executable, "-m", *words]
+    here = environment(PYTHONPATH=str(copy))
+    done = subprocess.run(line, cwd=copy, env=here, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_one_new_file_or_folder_is_all_that_it_takes(kind: str, copy: Path) -> None:
-    new = KINDS[kind]
-    assert len(new.files) == 1 or len({Path(name).parent for name in new.files}) == 1
-    for name, content in new.files.items():
-        path = copy / name
-        assert not path.exists()
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-    here = environment(PYTHONPATH=str(copy))
-    for command, printed in new.seen.items():
-        words = [sys.executable, "-m", *command.removeprefix("!").split()]
-        done = subprocess.run(words, cwd=copy, env=here, capture_output=True, text=True, check=False)
-        output = done.stdout + done.stderr
-        assert (done.returncode != 0) == command.startswith("!"), output
+def test_one_new_file_or_folder_is_all_that_commands_need(kind: str, copy: Path) -> None:
+    for command, printed in KINDS[kind].seen.items():
+        status, output = printed_by(command.removeprefix("!").split(), copy)
+        assert (status != 0) == command.startswith("!"), output
         assert printed in output, output
+
+
+def test_one_new_file_or_folder_is_all_that_tests_need(copy: Path) -> None:
+    files = [file for new in KINDS.values() for file in new.tested]
+    status, output = printed_by(["pytest", "-q", "-rA", *files, "-k", "own_ or zero or (solvers and test_init)"], copy)
+    assert status == 0, output
+    passed = collections.Counter(re.findall(r"^PASSED (tests/[^:]+)::", output, re.MULTILINE))
+    for kind, new in KINDS.items():
+        for file, count in new.tested.items():
+            assert passed[file] >= count, (kind, file, output)

@@ -72,6 +72,7 @@ def _said(record: type) -> str:
     return reference_pages._section("", record).partition("\n")[2].strip()
 
 
+@pytest.mark.slow
 def test_every_public_name_verb_and_case_is_in_the_reference() -> None:
     assert re.findall(r"^## (\w+)$", reference_pages.api(), re.MULTILINE) == fr.__all__
     assert re.findall(r"^## (\w+)$", reference_pages.gallery(), re.MULTILINE) == fr.cases()

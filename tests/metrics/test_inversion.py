@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.mesh import Polylines, Surface, triangle_areas
-from fem_reference.geometry.windings import outer_windings
+from fem_reference.geometry.distance import outer_windings
 from fem_reference.metrics import MeasurementContext, at_rest, inversion
 from fem_reference.runs.store import Outcome, Run
 

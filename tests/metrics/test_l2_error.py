@@ -8,7 +8,7 @@ import pytest
 from fem_reference import metrics
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry import lagrange
+from fem_reference.geometry import field_mesh
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.metrics import FieldContext, measure
 from fem_reference.runs.store import Outcome, Run
@@ -103,7 +103,7 @@ def test_without_an_exact_solution_there_is_no_error() -> None:
 def test_the_rules_are_exact_up_to_degree_nine(degree: int) -> None:
     # Over the unit interval x^d is 1 / (d + 1), over the unit triangle x^d is 2 / ((d + 1) (d + 2)) of its area.
     for corners, expected in ((2, 1 / (degree + 1)), (3, 2 / ((degree + 1) * (degree + 2)))):
-        barycentric, weights = lagrange.rule(corners)
+        barycentric, weights = field_mesh.rule(corners)
         for corner in range(corners):
             assert barycentric[:, corner] ** degree @ weights == pytest.approx(expected, rel=1e-13)
 

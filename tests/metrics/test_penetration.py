@@ -166,6 +166,7 @@ def test_what_flat_triangles_cut_off_a_round_bone_does_not_count_unless_they_are
     assert coarse.where[0].startswith("between vertices at (")
 
 
+@pytest.mark.slow
 def test_a_bone_between_the_vertices_of_a_coarse_surface_is_met() -> None:
     # A ball of 3 mm goes through a bar, both its sides 10 mm away from any vertex; its own middle is in it for 10 mm.
     bar = shapes.skin(shapes.box((1, 1, 1), (10.0, 10.0, 40.0)))

@@ -117,6 +117,7 @@ ramp = [{ frame = 0, amount = 0.0 }, { frame = 4, amount = 1.0 }]
     assert [one.decisions[-1].needed for one in found] == [False, True]
 
 
+@pytest.mark.slow
 def test_listed_effects_are_said_to_act(tmp_path, capsys) -> None:
     """Far away bones and no weight: "auto" would leave both out, and "listed" does not."""
     values = STILL | {"contact": 500.0}

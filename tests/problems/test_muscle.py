@@ -74,6 +74,7 @@ def test_a_ball_that_passes_through_is_deep_in_the_bar(tmp_path) -> None:
     assert 2.6 < found[1] <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [(1, 1, 1), COARSE, FINE])
 def test_it_is_known_before_that_the_ball_reaches_the_bar(tmp_path, cells) -> None:
     for effects in ("listed", "auto"):

@@ -7,7 +7,7 @@ import pytest
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.runs import store
-from fem_reference.runs.contents import amend
+from fem_reference.runs.contents import amend, frame_file
 from tests.runs.stored import write
 
 
@@ -51,3 +51,9 @@ def test_what_is_amended_leaves_the_rest(tmp_path: Path) -> None:
     amend(folder, message="another", name="other")
     assert json.loads((folder / "run.json").read_text()) == before | {"message": "another", "name": "other"}
     assert store.load(folder).name == "other"
+
+
+def test_frames_between_whole_numbers_share_no_file() -> None:
+    assert frame_file(10.0, ".vtp") == frame_file(10, ".vtp") == "frame_0010.vtp"
+    with pytest.raises(ValueError, match=r"frame 0\.2, which is no whole number, has no file"):
+        frame_file(0.2, ".vtp")

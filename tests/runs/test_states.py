@@ -1,4 +1,4 @@
-"""States of the reference: kept by default where they are small, asked for before a run is solved again for ParaView."""
+"""States and fields on disk: kept by default where they are small, read back with every node, and a damaged file is named."""
 
 import json
 from dataclasses import replace
@@ -10,9 +10,12 @@ import shapes
 import small
 
 import fem_reference as fr
+from fem_reference.foundations.errors import InputError
+from fem_reference.geometry.field_mesh import FieldMesh
+from fem_reference.io import files
 from fem_reference.problems.body import ELEMENTS, Cells
 from fem_reference.runs import states
-from fem_reference.runs.states import NodalState
+from fem_reference.runs.states import NodalField, NodalState, write_arrays
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import resources
 
@@ -62,3 +65,51 @@ KEYFRAMES = [{"frame": 0, "angle": "0 rad"}, {"frame": 5, "angle": "0.1 rad"}]
 
 def test_bodies_carry_no_states_by_default() -> None:
     assert not fenicsx.BodySettings().store_state
+
+
+SQUARE = FieldMesh(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), np.array([[0, 1, 2], [0, 2, 3]]), "a square")
+WHOLE = {"points": SQUARE.points, "cells": SQUARE.cells, "psi": np.arange(4.0)}
+
+
+@pytest.mark.parametrize("nodes", [4, 9])
+def test_what_is_written_reads_back(nodes: int, tmp_path: Path) -> None:
+    """On vertices alone, or on the middles of the five edges too; ParaView is shown the vertices."""
+    for number in (0, 5):
+        values = {"psi": np.arange(nodes) + 1.0 * number, "velocity": np.full((4, 2), number)}
+        path = tmp_path / states.FIELD / f"frame_{number:04d}.vtu"
+        path.parent.mkdir(exist_ok=True)
+        states.write_field(path, NodalField(SQUARE, values, "galerkin"))
+    mesh, arrays = states.read_field(tmp_path, (0, 5))
+    assert np.array_equal(mesh.points, SQUARE.points)
+    assert np.array_equal(mesh.cells, SQUARE.cells)
+    assert np.array_equal(arrays["psi"], [np.arange(nodes), np.arange(nodes) + 5.0])
+    assert arrays["velocity"].shape == (2, 4, 2)
+    assert np.array_equal(files.read_points(tmp_path / states.FIELD / "frame_0005.vtu")[:, :2], SQUARE.points)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"psi": None}, r"frame_0005\.npz: got points, cells, want the arrays points, cells and psi"),
+        ({"psi": np.zeros(5)}, r"frame_0005\.npz: got .*, want points \(n, d\), cells .* as in the other frames"),
+        ({"cells": SQUARE.cells + 1}, r"frame_0005\.npz: got .*, want points \(n, d\), cells"),
+        ({"cells": SQUARE.cells - 1}, r"frame_0005\.npz: got .*, want points \(n, d\), cells"),
+        ({"psi": np.array(["a"] * 4)}, r"frame_0005\.npz: got .*, want points \(n, d\), cells"),
+        ({"psi": np.zeros((4, 1))}, r"frame_0005\.npz: got .*, want points \(n, d\), cells"),
+    ],
+)
+def test_a_damaged_frame_is_named(changes: dict[str, object], message: str, tmp_path: Path) -> None:
+    (tmp_path / states.FIELD).mkdir()
+    damaged = {name: array for name, array in (WHOLE | changes).items() if array is not None}
+    write_arrays(tmp_path / states.FIELD / "frame_0000.npz", WHOLE)
+    write_arrays(tmp_path / states.FIELD / "frame_0005.npz", damaged)
+    with pytest.raises(InputError, match=message):
+        states.read_field(tmp_path, (0, 5))
+
+
+def test_there_is_one_value_a_node(tmp_path: Path) -> None:
+    """A square of two triangles has 4 vertices and 5 edges."""
+    (tmp_path / states.FIELD).mkdir()
+    write_arrays(tmp_path / states.FIELD / "frame_0000.npz", WHOLE | {"psi": np.zeros(7)})
+    with pytest.raises(InputError, match=r"frame_0000\.npz: got 7 values, want 4 or 9, one a node"):
+        states.read_field(tmp_path, (0,))

@@ -102,8 +102,6 @@ def test_what_may_be_left_out_may_be_left_out() -> None:
     arguments.check_changes({})
     arguments.check_solver(None, {})
     arguments.check_solver("pbd", {"damping": 0.1})
-    arguments.check_progress(None)
-    arguments.check_progress(print)
     arguments.check_error_bars(None, fr.load_case("rod"))
 
 

@@ -16,7 +16,7 @@ from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import cost
-from fem_reference.studies.ladders import Trial
+from fem_reference.studies.variations import Trial
 
 BALL = shapes.sphere(1, 10.0)
 LINE = Polylines(np.array([[0.0, 0, -8], [0, 0, 8]]), np.array([0, 2]))

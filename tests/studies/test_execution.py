@@ -9,7 +9,7 @@ import small
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.studies import execution
+from fem_reference.studies import making
 from fem_reference.studies.execution import Bench
 
 pytestmark = pytest.mark.slow
@@ -53,12 +53,12 @@ def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, cap
     caplog.set_level(logging.INFO, logger="fem_reference")
     made = bench(tmp_path)
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
-    now = execution.versions()
-    monkeypatch.setattr(execution, "versions", lambda: now | {"numba": "0"})
+    now = making.versions()
+    monkeypatch.setattr(making, "versions", lambda: now | {"numba": "0"})
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
     assert "solved before, but with another numba" in caplog.text
     # What is not installed here cannot be compared: stored runs are judged where no solver is.
-    monkeypatch.setattr(execution, "versions", lambda: {"numpy": now["numpy"]})
+    monkeypatch.setattr(making, "versions", lambda: {"numpy": now["numpy"]})
     caplog.clear()
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
     assert "solved before, taken from" in caplog.text

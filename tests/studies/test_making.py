@@ -25,7 +25,7 @@ from fem_reference.solvers import fenicsx
 from fem_reference.studies import making
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.making import bars_kept, locked
-from fem_reference.studies.scene_changes import without_states
+from fem_reference.studies.variations import without_states
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import installed
 from fem_reference.studies import omissions
-from fem_reference.studies.ladders import Trial
 from fem_reference.studies.omissions import LeftOut
+from fem_reference.studies.variations import Trial
 
 GRAVITY = """
 [[effect]]

@@ -5,7 +5,7 @@ import pytest
 
 from fem_reference.problems import shapes
 from fem_reference.verification import heart
-from fem_reference.verification.truths import find
+from fem_reference.verification.parts import find
 
 
 def test_the_crowded_ventricle_is_the_same_body() -> None:

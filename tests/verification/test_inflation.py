@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fem_reference.runs.store import Frame, Outcome, collected
-from fem_reference.verification import inflation, truths
+from fem_reference.verification import inflation, parts
 
 
 def test_the_slope_of_the_energy_is_the_pressure() -> None:
     # The energy of the closed form, integrated over 200 Gauss points, at the frames of the entries: its slope over the enclosed
     # volume is the pressure, up to the polynomial, 1e-6.
-    sphere = truths.find("rivlin").Sphere(inflation.MU, inflation.INNER, inflation.OUTER)
+    sphere = parts.find("rivlin").Sphere(inflation.MU, inflation.INNER, inflation.OUTER)
     ticks, weights = np.polynomial.legendre.leggauss(200)
 
     def energy(stretch: float) -> float:

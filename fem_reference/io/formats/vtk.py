@@ -67,29 +67,30 @@ def read_points(path: Path) -> Any:
 
 def _data(path: Path) -> DataSet:
     """The data set of a VTK file."""
-    return (_vtk_legacy if path.suffix.lower() == ".vtk" else _vtk_xml).read(path.read_bytes())
+    read = _vtk_legacy.read if path.suffix.lower() == ".vtk" else _vtk_xml.read
+    return read(path.read_bytes())
 
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
     """The surface with point data ``displacement`` [mm], float64; as an unstructured grid in VTU."""
-    data = _data_set(DataBlock(surface.points, surface.triangles))
-    _save(path, data.cast_to_unstructured_grid() if path.suffix.lower() == ".vtu" else data, displacement)
+    _save(path, surface.points, surface.triangles, displacement)
 
 
 def _write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
     """The lines with point data ``displacement`` [mm], float64."""
-    _save(path, _data_set(DataBlock(lines.points, lines)), displacement)
+    _save(path, lines.points, lines, displacement)
 
 
 def write_tets(path: Path, mesh: TetMesh, displacement: Floats) -> None:
     """VTU of the tets with point data ``displacement`` [mm], float64."""
-    _save(path, _data_set(DataBlock(mesh.points, mesh.tets)), displacement)
+    _save(path, mesh.points, mesh.tets, displacement)
 
 
-def _save(path: Path, data: Any, displacement: Floats) -> None:
-    """Write ``data`` with its ``displacement`` (n, 3) [mm]; OSError where that fails."""
+def _save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
+    """Write ``cells`` with the ``displacement`` (n, 3) [mm] of their points; OSError where that fails."""
+    data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
-    _finish(_WRITERS[path.suffix.lower()], path, data)
+    _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
 
 
 def _finish(kind: str, path: Path, data: Any) -> None:

@@ -10,8 +10,8 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
+from fem_reference.runs.writer import CutOff
 
 Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 

@@ -17,8 +17,8 @@ from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept

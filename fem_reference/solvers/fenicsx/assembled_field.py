@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.effects import FieldState, Place
 from fem_reference.foundations.formula import FUNCTIONS, evaluate
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc

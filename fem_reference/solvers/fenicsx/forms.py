@@ -12,6 +12,7 @@ from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
 from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
+from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes
@@ -21,15 +22,11 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 Rule = tuple[Floats, Floats]
 
 
-class UflFunctions:
-    """``effects.Functions`` of UFL expressions."""
+def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+    return ufl.conditional(ufl.gt(x, limit), then, otherwise)
 
-    exp = staticmethod(ufl.exp)
-    log = staticmethod(ufl.ln)
-    sqrt = staticmethod(ufl.sqrt)
-    cos = staticmethod(ufl.cos)
-    sin = staticmethod(ufl.sin)
-    above = staticmethod(lambda x, limit, then, otherwise: ufl.conditional(ufl.gt(x, limit), then, otherwise))
+
+_FUNCTIONS = Functions(ufl.exp, ufl.ln, ufl.sqrt, ufl.cos, ufl.sin, _above)
 
 
 class Derivatives(NamedTuple):
@@ -172,7 +169,7 @@ def _state(unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | Non
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
-        functions=UflFunctions(),
+        functions=_FUNCTIONS,
         **timed,
     )
     return state, _Variables(F, displacement, others[0] if others else None)

@@ -9,8 +9,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, fingerprint
 from fem_reference.problems.body import Body
 from fem_reference.runs.contents import frame_file
-from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.states import read_arrays
+from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 

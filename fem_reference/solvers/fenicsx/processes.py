@@ -15,8 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fem_reference.foundations.errors import InputError, MissingSoftware
-from fem_reference.foundations.subprocesses import command, environment
-from fem_reference.foundations.usage import processor_times
+from fem_reference.foundations.subprocesses import command, environment, processor_times
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import cloudpickle
 import numpy as np
 
-from fem_reference.foundations import scratch
+from fem_reference.foundations.subprocesses import scratch_folder
 from fem_reference.problems.body import Body, check_quadrature
 from fem_reference.problems.checks import check
 from fem_reference.problems.scalar import FieldProblem
@@ -66,7 +66,7 @@ class Session:
 def session(ranks: int = 1) -> Iterator[Session]:
     """A session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
-    with scratch.folder() as folder:
+    with scratch_folder() as folder:
         own = Session(folder, ranks)
         try:
             yield own

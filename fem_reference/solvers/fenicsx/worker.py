@@ -8,8 +8,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from fem_reference.foundations.subprocesses import end_with_starter
-from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import end_with_starter, forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
 
 from fem_reference.effects import Effect, Load, State, total_energy
-from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
+from fem_reference.foundations.jets import JET_FUNCTIONS, Jet, constant, variables
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
@@ -185,7 +185,7 @@ def _state(entries: Sequence[Any], fibre: Floats | None, amount: float = 1.0) ->
         pressure=entries[PRESSURE],
         fibre=None if fibre is None else _columns(fibre),
         amount=amount,
-        functions=JetFunctions(),
+        functions=JET_FUNCTIONS,
     )
 
 

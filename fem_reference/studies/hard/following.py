@@ -1,6 +1,9 @@
-"""Runs of hard cases, followed frame by frame as their health is measured."""
+"""Runs of hard cases: followed frame by frame as their health is measured, and repeated in other load steps and on other meshes."""
 
-from dataclasses import replace
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,20 +11,37 @@ from fem_reference import solvers
 from fem_reference.assessment import second_check
 from fem_reference.assessment.health import Followed
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.problems.problem import NO_SURFACE
-from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.fields import VALUES
+from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies.hard.records import task_of
-from fem_reference.studies.hard.repeats import check_not_stalled
+from fem_reference.studies.hard.records import Hard, StepCounts, task_of
 
 _MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
+SAME = 0.01  # [%] of the body's size: states that differ by more are different
+_CUTS = 64  # a load step is cut to this part of itself before it is given up
+MOVED = 0.1  # of a cell of a block, by which its points are moved at most
+SIZES = 0.03  # of the size of the tetrahedra of a shipped case, by which it differs at most
+LONGEST = 60.0  # [s] of processor time of a run that is repeated
+
+Solve = Callable[[Hard], tuple[Outcome, Followed]]
+
+
+class StalledError(Exception):
+    """The machine was too busy to say anything of a run, and why."""
+
+
+def check_not_stalled(outcome: Outcome) -> None:
+    """StalledError where an ``outcome`` says nothing of the run."""
+    if outcome.status == "stalled":
+        raise StalledError(outcome.message)
 
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
@@ -42,7 +62,10 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)
     check_not_stalled(outcome)
     if built.field is not None:
-        return outcome, _of_field(built.field, frames)
+        values = np.array([frame.field.arrays[VALUES] for frame in frames if frame.field])
+        boundary = built.field.fixed[np.isfinite(built.field.fixed)]
+        span = boundary.min(), boundary.max()
+        return outcome, Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=span)
     assert muscle is not None  # what is no field
     rest, mesh = muscle.surface.points, muscle.mesh
     if as_body:  # whose surface goes along with the tetrahedra
@@ -51,13 +74,6 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     if solvers.takes_effects(solver):
         outcome = second_check.confirmed_frames(muscle, frames, outcome, settings)
     return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(rest))])
-
-
-def _of_field(field: FieldProblem, frames: list[Frame]) -> Followed:
-    """The values of a scalar field, and the range of those on its boundary."""
-    values = np.array([frame.field.arrays[VALUES] for frame in frames if frame.field])
-    boundary = field.fixed[np.isfinite(field.fixed)]
-    return Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=(boundary.min(), boundary.max()))
 
 
 def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
@@ -84,3 +100,88 @@ def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
         material_modes=scalar("material_modes"),
         least_determinant=np.min(known, axis=0) if known else None,
     )
+
+
+@dataclass(frozen=True)
+class SameEnd:
+    """A comparison of runs that should end alike: ``same`` where those that reached the end did; a ``sentence`` on each."""
+
+    same: bool
+    sentence: str
+
+
+def farthest(followed: Followed) -> StepCounts | None:
+    """Load steps to the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+    moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
+    return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
+
+
+def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
+    """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
+    ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
+    for count in steps.counts:
+        step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
+        settings, frames = fenicsx.Settings(**{**choice.settings, **step}), list[Frame]()
+        outcome = fenicsx.solve(replace(built, frames=(built.frames[0], steps.until)), settings, frames.append)
+        check_not_stalled(outcome)
+        if outcome.status == "converged":
+            ends[count] = frames[-1].points
+        else:
+            words.append(f"{count}: {outcome.status}")
+    if not ends:
+        return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
+    standard, size = ends[max(ends)], diagonal(built.surface.points)
+    off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
+    apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
+    listed = ", ".join(apart + words) or "one only"
+    return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
+
+
+def jittered(hard: Hard, number: int) -> Hard:
+    """The case on the mesh of a ``number``, the same each time."""
+    if hard.block is not None:
+        jitter = max(hard.block.jitter, MOVED)
+        return hard.model_copy(update={"block": hard.block.model_copy(update={"jitter": jitter, "seed": number})})
+    shipped = hard.shipped
+    assert shipped is not None  # a Hard record has one of the two
+    size = casefile.muscle(shipped.read()).muscle.tet_size
+    share = 1 + SIZES * np.random.default_rng(number).uniform(-1, 1)
+    changed = shipped.changes | {"muscle.tet_size": f"{share * float(size)!r} mm"}
+    return hard.model_copy(update={"shipped": shipped.model_copy(update={"changes": changed})})
+
+
+def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
+    """Compare ``count`` runs on other meshes with the ``first``: status, and greatest distance over frames [% of the size]."""
+    begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
+    ended, off, reached = Counter[str](), list[float](), list[int]()
+    for number in range(1, count + 1):
+        try:
+            other, found = solve(jittered(hard, number))
+        except InputError as error:
+            if not ended:
+                return SameEnd(True, f"no jitters: {error}")
+            ended["refused"] += 1
+            continue
+        ended[other.status] += 1
+        elsewhere += other.cost.get("seconds_processor", 0.0)
+        reached.append(found.numbers[-1])
+        off.append(_apart(followed, found))
+        if time.process_time() - begin + elsewhere > LONGEST * number:
+            return SameEnd(True, f"no jitters, of which one takes more than {LONGEST:g} s")
+    words = ", ".join(f"{many} {status}" for status, many in ended.most_common())
+    if off:
+        words += f", up to frame {' to '.join(map(str, sorted({min(reached), max(reached)})))}"
+        words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
+    statuses = set(ended) - {"refused"}
+    alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses
+    return SameEnd(alike, f"jitters: {words}")
+
+
+def _apart(one: Followed, other: Followed) -> float:
+    """The greatest distance of two runs over the frames of both [% of the body's size]."""
+    both = min(len(one.numbers), len(other.numbers))
+    moved = other.positions[:both]
+    if other.mesh is not None and other.nodes is not None:
+        at = Locator(other.mesh).embed(one.surface.points)
+        moved = np.array([at.interpolate(other.mesh, nodes) for nodes in other.nodes[:both]])
+    return 100 * float(np.linalg.norm(one.positions[:both] - moved, axis=2).max()) / one.size

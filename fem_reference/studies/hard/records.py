@@ -62,9 +62,7 @@ class Lattice(Record):
 
 
 class Hold(Record):
-    """A ``face`` of the block, or the vertex in its ``middle`` alone, that is attached to a bone of its own, which rests or has a
-    ``motion``; by springs or exactly.
-    """
+    """A ``face`` of the block, or its ``middle`` vertex, attached by springs or exactly to a bone at rest or in ``motion``."""
 
     face: Face
     middle: bool = False
@@ -200,9 +198,7 @@ def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard case in a file, or its variants: each is the file with the keys of a ``[[variant]]`` in their place. InputError
-    where any of it cannot be posed to a solver as it is written.
-    """
+    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one cannot be posed."""
     table, folder = texts.toml(path), path.parent.name
     if "variant" not in table:
         yield _hard(table, folder, str(path))

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,10 +25,9 @@ from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
-from fem_reference.studies.hard import blocks, repeats
-from fem_reference.studies.hard.following import follow
+from fem_reference.studies.hard import blocks, following
+from fem_reference.studies.hard.following import SameEnd, StalledError, follow
 from fem_reference.studies.hard.records import LIMIT, REFERENCE, SECOND, Hard, choices
-from fem_reference.studies.hard.repeats import SameEnd, StalledError
 
 log = logging.getLogger(__name__)
 
@@ -41,15 +40,18 @@ class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught
     """A run took too much processor time."""
 
 
+@dataclass(eq=False)
 class Posed:
-    """A hard case with the problem that it poses, made once, and the reference's run of it."""
+    """A hard case with the problem that it poses, made once, and the reference's run of it (``truth``: positions and frames).
 
-    def __init__(self, hard: Hard, *, in_steps: bool = False, jitters: int = 0) -> None:
-        """``in_steps``: the reference goes to its farthest frame in several numbers of load steps, whether the case asks or not;
-        ``jitters``: on how many other meshes it runs.
-        """
-        self.hard, self.in_steps, self.jitters = hard, in_steps, jitters
-        self.truth: tuple[Floats, tuple[int, ...]] | None = None
+    ``in_steps``: the reference goes to its farthest frame in several numbers of load steps, whether the case asks or not;
+    ``jitters``: on how many other meshes it runs.
+    """
+
+    hard: Hard
+    in_steps: bool = False
+    jitters: int = 0
+    truth: tuple[Floats, tuple[int, ...]] | None = None
 
     @cached_property
     def problem(self) -> CaseProblem:
@@ -63,9 +65,7 @@ class Posed:
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
-    """Every solver, or ``only`` these, on each of the cases; the reference first, which others may be measured against, and
-    ``in_steps`` of 1, 10 and 40 to each case's farthest frame, and on so many other meshes.
-    """
+    """Every solver, or ``only`` these, on each case, the reference first; it also ``in_steps`` and on so many ``jitters``."""
     begin, cells = time.perf_counter(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     with fenicsx.shared():
@@ -104,9 +104,8 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """_Late where what is done meanwhile takes longer of this process's processor time, StalledError where it takes many times that
-    by the clock, as far as it is in the main thread and lets itself be interrupted; processes of the reference have a limit of
-    their own.
+    """Raise _Late after so many seconds of this process's processor time, and StalledError after many times as long by the clock,
+    in the main thread; processes of the reference have a limit of their own.
     """
 
     def late(*_: object) -> None:
@@ -166,18 +165,16 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
     hard, muscle = posed.hard, posed.problem.muscle
     if muscle is None or choice.solver != REFERENCE:
         return
-    wanted = hard.steps or (repeats.farthest(followed) if posed.in_steps and hard.start is None else None)
+    wanted = hard.steps or (following.farthest(followed) if posed.in_steps and hard.start is None else None)
     if wanted is not None:
-        yield repeats.in_steps(muscle, choice, wanted)
+        yield following.in_steps(muscle, choice, wanted)
     if posed.jitters:
         first = outcome, followed
-        yield repeats.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
+        yield following.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The picture of the frame that decided, of a run that ended before all of them the last one, with the place that its message
-    names; None of what has no surface, or is not finite.
-    """
+    """The deciding frame (of an unfinished run its last) as a picture with the named place; None without a finite surface."""
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
     points, history = followed.positions[i], found.history

@@ -8,8 +8,8 @@ import pytest
 from fem_reference.foundations.mesh import fingerprint
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body
-from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.states import write_arrays
+from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.fenicsx.jobs import kept
 from fem_reference.verification import parts
 

@@ -8,7 +8,7 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
-from fem_reference.runs.cut_off import CutOff
+from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.jobs import kept

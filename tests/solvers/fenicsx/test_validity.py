@@ -18,9 +18,9 @@ from fem_reference.problems.paths import Affine, Along, Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
 from fem_reference.verification import squeeze
-from fem_reference.verification.collapse import MU, POISSON, bulk_modulus, squeezed
 from fem_reference.verification.homogeneous import everywhere
 from fem_reference.verification.parts import resistance
+from fem_reference.verification.squeeze import MU, POISSON, bulk_modulus, squeezed
 from validation.loads import squeezed_volume
 
 pytestmark = pytest.mark.slow

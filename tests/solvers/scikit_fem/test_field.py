@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from fem_reference.geometry.lagrange import l2_distance
+from fem_reference.geometry.field_mesh import l2_distance
 from fem_reference.problems.scalar import at, build
 from fem_reference.solvers import scikit_fem
 from fem_reference.solvers.scikit_fem import ScikitFieldSettings

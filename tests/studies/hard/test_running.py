@@ -12,7 +12,7 @@ from fem_reference.geometry import skins
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx, pbd
-from fem_reference.studies.hard import records, repeats, running
+from fem_reference.studies.hard import following, records, running
 
 CASES = {hard.name: hard for hard in records.read_all()}
 FAST = [name for name in records.choices() if name not in ("fenicsx", "scikit_fem")]
@@ -39,7 +39,7 @@ def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
 def test_fibres_that_pull_with_many_shear_moduli_end_alike_whatever_the_steps() -> None:
     found = cell("activation.both_ends_held", "fenicsx")
     assert found.verdict == "ok"
-    assert float(found.sentence.split("steps: 1: ")[1].split(" %")[0]) < repeats.SAME
+    assert float(found.sentence.split("steps: 1: ")[1].split(" %")[0]) < following.SAME
 
 
 @pytest.mark.slow
@@ -92,6 +92,7 @@ def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
     assert "ZeroDivisionError" in found.sentence
 
 
+@pytest.mark.slow
 def test_a_busy_machine_turns_no_verdict(monkeypatch) -> None:
     """A solver that waits longer than it may work, and then solves, is judged as if it had not; one that works longer failed."""
     solve, waits, works = pbd.solve, [3.0], [0.0]

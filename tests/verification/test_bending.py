@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fem_reference.verification import flexure
+from fem_reference.verification import bending
 
 
 def test_bend_starts_at_rest_and_keeps_volume() -> None:
     # The material is incompressible: det F = 1 by central differences of 1e-4 mm, good to 1e-8.
-    bend = flexure.Flexed(10.0, 20.0, 1.0)
+    bend = bending.Flexed(10.0, 20.0, 1.0)
     points = np.random.default_rng(3).uniform((0, -10, 0), (10, 10, 2), (20, 3))
     assert np.abs(bend(points, 0.0)).max() < 1e-14
     sides = [np.eye(3)[axis] * 1e-4 for axis in range(3)]
@@ -19,4 +19,4 @@ def test_bend_starts_at_rest_and_keeps_volume() -> None:
 def test_a_circle_is_found_through_its_points() -> None:
     angles = np.array([0.1, 0.4, 0.5, 0.9])
     points = 7 * np.stack([np.cos(angles), np.sin(angles)], axis=1) + [3.0, -2.0]
-    assert flexure.circle(points) == pytest.approx(7, rel=1e-9)
+    assert bending.circle(points) == pytest.approx(7, rel=1e-9)

@@ -1,0 +1,160 @@
+"""A case on the command line: its choice and that of candidates, and pages, with the parts of a command that determine them."""
+
+import argparse
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from fem_reference import metrics, report, solvers
+from fem_reference.assessment import judge
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
+from fem_reference.problems import of_case
+from fem_reference.report.asked import Asked, Part, written
+from fem_reference.report.overview import comparison_text
+from fem_reference.report.pages import Page
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import HOME, Candidate, Case, Expectation
+from fem_reference.solvers import fenicsx, recorded
+from fem_reference.studies import judging
+from fem_reference.studies.execution import Bench
+
+
+def scene_of(options: argparse.Namespace) -> Case:
+    """The case, with what ``--set`` changes of it and the effects that it needs; it expects of every candidate too that statistics
+    deviate no more than by ``--limit``, METRIC.STATISTIC=VALUE each.
+    """
+    if options.negative_control and options.set:
+        raise InputError("--negative-control", "with --set", "one of the two")
+    changes = dict(map(casefile.setting, options.set))
+    read = casefile.read(options.case, with_negative_control=options.negative_control, changes=changes)
+    case = of_case.chosen(read)
+    units = metrics.units(against=case.standards("candidates"))
+    asked = (_expectation(text, units) for text in options.limit)
+    return case.model_copy(update={"expect": (*case.expect, *asked)})
+
+
+def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
+    """The expectation by METRIC.STATISTIC=VALUE of every candidate; ``units`` of the statistics that there are."""
+    name, _, within = (part.strip() for part in text.partition("="))
+    metric, dot, statistic = name.partition(".")
+    if not dot or not within:
+        raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
+    if name not in units:
+        near = get_close_matches(name, units, n=5) or sorted(units)
+        raise InputError("--limit", f'"{name}"', f"a statistic such as {', '.join(near)}")
+    unit = within.lstrip("+-.0123456789eE ")
+    try:
+        limit = within if unit else float(within)
+        judge.in_unit(limit, units[name])
+    except ValueError as error:
+        raise InputError("--limit", f'"{name}={within}"', f"a value in {units[name]}: {error}") from error
+    table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
+    table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
+    return parse(Expectation, table, "--limit")
+
+
+def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
+    """The candidates of the case, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(case.candidate)]
+
+
+def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
+    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
+    settings of the page table-5-1; and the place that chooses it.
+    """
+    names = [candidate.name for candidate in case.candidate]
+    if text in names:
+        if Path(text).is_dir():
+            got = f'"{text}", a candidate of the case and a folder'
+            raise InputError("--candidate", got, f"another name, or ./{text}")
+        return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    if text in solvers.names(case.task) and not Path(text).exists():
+        found = solvers.choice(case, text)[1]
+        return Candidate(name=text, solver=text, **found.settings), "--candidate"
+    if not text or not Path(text).exists():
+        raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")
+    return recorded.choice(Path(text), unit, "--candidate"), "--candidate"
+
+
+def check_names(names: list[str]) -> None:
+    """InputError where two candidates have one name, or one has that of the reference."""
+    for name in names:
+        if name == "reference":
+            raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
+        if names.count(name) > 1:
+            raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
+
+
+def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
+    """The bench of a case whose expectations, solvers and names are good; InputError, also for error bars of what has none."""
+    if options.error_bar:
+        casefile.muscle(scene, "--error-bar")
+    check_names([entry.name for entry, _ in chosen])
+    judge.check(scene)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
+    bench.check(chosen)
+    return bench
+
+
+def case_part(case: Case) -> Part:
+    """The case of a page: by its name where it is a shipped one, else by its folder."""
+    return Part((case.name if case.folder.parent == HOME / "cases" else str(case.folder),))
+
+
+def changes(options: argparse.Namespace) -> tuple[Part, ...]:
+    """The changes of a case by ``--set`` and ``--negative-control``."""
+    control = (Part(("--negative-control",), "negative_control"),) if options.negative_control is True else ()
+    return (*(Part(("--set", text), text) for text in getattr(options, "set", ())), *control)
+
+
+def asked(verb: str, case: Case, options: argparse.Namespace, page: str, *more: Part) -> Asked:
+    """The ``page`` of a case with its changes, and with ``more``."""
+    return Asked(verb, case.name, (case_part(case), *changes(options), *more), page)
+
+
+def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
+    """The candidates of a page; nothing where they are the case's own."""
+    found = tuple(chosen)
+    if found == case.candidate:
+        return ()
+    foreign = [one.solver == "recorded" and one not in case.candidate for one in found]
+    words = [one.settings["folder"] if read else one.name for one, read in zip(found, foreign, strict=True)]
+    return tuple(Part(("--candidate", word), one.name) for word, one in zip(words, found, strict=True))
+
+
+def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[str, Any], text: str) -> None:
+    """Print ``text`` (``facts`` as JSON), and write a page into ``--out``, by ``--name`` where that is given."""
+    write_output(facts, text, options)  # also where the page fails
+    print(*written(asked, page, out(options), options.page_name)[1], sep="\n")
+
+
+def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
+    with fenicsx.shared():
+        result = judging.judged(checked_bench(case, options, chosen), chosen, error_bars=options.error_bar)
+    alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
+    who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
+    wanted = asked("run" if alone else "compare", case, options, "report", *who)
+    text = "\n".join([comparison_text(result), *unturned(options, result.word)])
+    publish(options, wanted, report.of_comparison(result), report.summary(result), text)
+    return status([result])
+
+
+def unturned(options: argparse.Namespace, word: str) -> list[str]:
+    """A line where the negative control was to turn the verdict, and did not."""
+    if not options.negative_control or word == "fail":
+        return []
+    why = "what it changes is not judged here (compare judges candidates too), or matters too little"
+    return [f"negative control: the verdict is {word} and was to be fail: {why}"]
+
+
+def status(results: Iterable[Comparison]) -> int:
+    """The exit status of comparisons."""
+    found = tuple(results)
+    if any(run.outcome.status != "converged" for result in found for run in result.runs):
+        return SOLVER_FAILED
+    return VERDICT_FAIL if any(result.word == "fail" for result in found) else DONE

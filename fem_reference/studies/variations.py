@@ -1,0 +1,228 @@
+"""Variations of a case: one thing changed, and the ladders of a study, on which one setting is varied at a time."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference import solvers
+from fem_reference.effects import Effect, make
+from fem_reference.effects.contact import among
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.coarsening import resampled
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.extension import Extension
+from fem_reference.io import files
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Run
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.muscle import MuscleCase, VertexList
+
+TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
+# Sizes of tetrahedra, in those of the case, at each number of refinements up to its own.
+_SIZES = (2.0, 1.6, 1.25, 1.0)
+# The reference's settings are varied on the mesh before the last refinement, or without one on tetrahedra so much larger.
+_COARSER = 1.6
+_REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
+_STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
+
+
+def on_tetrahedra(case: MuscleCase, **changes: float) -> MuscleCase:
+    """The case with other keys of its muscle: ``tet_size`` [mm], ``refinements``."""
+    return case.model_copy(update={"muscle": case.muscle.model_copy(update=changes)})
+
+
+def with_contact(case: MuscleCase, **changes: float) -> MuscleCase:
+    """The case with other parameters of its contact."""
+    contact = among(case.effects)
+    effects = (one.model_copy(update=changes) if one is contact else one for one in case.effects)
+    return case.model_copy(update={"effect": tuple(effects)})
+
+
+def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
+    """The case with ``keys`` of the distances to the surfaces of bones times ``factor``; closed forms are exact."""
+    bones = (
+        bone.model_copy(update={key: factor * getattr(bone, key) for key in keys}) if bone.surface else bone
+        for bone in case.bone
+    )
+    return case.model_copy(update={"bone": tuple(bones)})
+
+
+def without_states(choice: SolverChoice) -> SolverChoice:
+    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
+    return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
+
+
+def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
+    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
+
+    A vertex is attached where the nearest of the original surface is.
+    """
+    surface = resampled(setup.surface, power)
+    named = hashlib.sha256(surface.points.tobytes() + surface.triangles.tobytes()).hexdigest()[:16]
+    place = (folder / named).absolute()
+    place.mkdir(parents=True, exist_ok=True)
+    files.write_surface(place / "surface.vtp", surface, surface.points)
+    nearest = nearest_vertices(setup.surface, surface.points)
+    attachments = []
+    for entry, attached in zip(case.attachment, setup.attached, strict=True):
+        path = place / f"{entry.name}.csv"
+        vertices = np.flatnonzero(np.isin(nearest, attached.vertices))
+        files.write_text(path, "".join(f"{vertex}\n" for vertex in vertices))
+        listed = {"vertices": VertexList(file=str(path)), "within": None, "outline": None}
+        attachments.append(entry.model_copy(update=listed))
+    muscle = case.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
+    # No file names these surfaces, so that they may be where they are.
+    return case.model_copy(update={"muscle": muscle, "attachment": tuple(attachments), "from_file": False})
+
+
+def nearest_vertices(surface: Surface, points: Floats) -> Floats:
+    """The nearest vertex of the nearest triangle to each of ``points`` (n, 3), (n,)."""
+    found = distances(points, surface)
+    corners = surface.triangles[found.triangle]
+    return np.asarray(np.take_along_axis(corners, found.barycentric.argmax(axis=1)[:, None], axis=1)[:, 0])
+
+
+def carried(run: Run, surface: Surface) -> Run:
+    """A ``run`` on another surface, carried to ``surface``, whose vertices follow by the extension that fibres follow by."""
+    if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
+        return run
+    extension = Extension.to(surface.points, run.surface)
+    positions = np.stack([extension.apply(moved) for moved in run.positions])
+    return replace(run, surface=surface, positions=positions)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run to be made: of a ``scene`` by ``choice``, called ``name``; what was varied (``knob``) to what (``value``), and the
+    scene's keys that were ``changed``, as scene files write them.
+    """
+
+    scene: MuscleCase
+    choice: SolverChoice
+    name: str
+    knob: str = ""
+    value: str = ""
+    changed: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """Its name in lines of progress."""
+        return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
+
+    def varied(self, knob: str, value: str, **changes: Any) -> "Trial":
+        """The trial with ``changes`` of its fields, by a ``knob`` beside what was varied before."""
+        beside = f" ({self.knob} = {self.value})" if self.knob else ""
+        return replace(self, knob=knob, value=value + beside, **changes)
+
+
+def reference_trials(case: MuscleCase) -> Iterator[Trial]:
+    """The reference of a case on other tetrahedra; on coarse ones with each trade of its solver varied, and with other contact."""
+    whole = Trial(case, case.reference, "reference")
+    yield whole
+    yield from _sizes(whole)
+    size, refinements = case.muscle.tet_size, case.muscle.refinements
+    base = _on(whole, size, refinements - 1) if refinements else _on(whole, _COARSER * size, 0)
+    yield from _settings(base)
+    yield from _contact(base)
+
+
+def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
+    """The candidates of a case, and those that Table 5.1 has on every scene: as they are, with each setting varied that
+    their solver says trades accuracy for time, and on other meshes; ``surfaces``: by what they are called, the case on
+    other triangles.
+    """
+    known = list[dict[str, Any]]()
+    for candidate in (*case.candidate, *solvers.in_table()):
+        offer = solvers.find(candidate.solver, candidate.name)
+        settings = {"solver": candidate.solver} | candidate.settings
+        if offer.moves == "nothing" or settings in known:
+            continue
+        known.append(settings)
+        whole = Trial(case, candidate, candidate.name)
+        yield whole
+        yield from _settings(whole)
+        if offer.moves == "tetrahedra":
+            yield from _sizes(whole)
+        elif offer.moves == "surface":
+            for text, other in surfaces.items():
+                yield Trial(other, candidate, candidate.name, TRIANGLES, text, {TRIANGLES: text})
+
+
+def _sizes(whole: Trial) -> Iterator[Trial]:
+    """A trial on other tetrahedra."""
+    own = whole.scene.muscle
+    for count in range(own.refinements + 1):
+        for factor in _SIZES:
+            if (count, factor) != (own.refinements, 1.0):
+                yield _on(whole, factor * own.tet_size, count)
+
+
+def _on(whole: Trial, size: float, refinements: int) -> Trial:
+    scene = on_tetrahedra(whole.scene, tet_size=size, refinements=refinements)
+    changed = {"muscle.tet_size": f"{size:.6g} mm", "muscle.refinements": refinements}
+    value = f"{size / 2**refinements:.3g} mm"
+    if whole.scene.muscle.refinements:
+        value += f", {_REFINED.get(refinements, f'refined {refinements} times')}"
+    return Trial(scene, whole.choice, whole.name, TETRAHEDRA, value, changed)
+
+
+def _settings(base: Trial) -> Iterator[Trial]:
+    """A trial with each setting of its solver at each step of its ladder but the one that it has."""
+    own = solvers.settings(base.choice, base.name)
+    for key, values in solvers.trades(type(own)).items():
+        for value in values:
+            if value not in (getattr(own, key), base.choice.settings.get(key)):
+                choice = base.choice.model_copy(update={key: value})
+                text = f"{value:.3g}" if isinstance(value, float) else str(value)
+                yield _by_element(base, choice, text) if key == "element" else base.varied(key, text, choice=choice)
+
+
+def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
+    """The trial by another element where that suits the effects; else the same energy of the volume with a pressure, or without."""
+    plain, effects = base.varied("element", text, choice=choice), list(base.scene.effects)
+    found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
+    if len(found) != 1 or _suits(choice, base.scene.effects):
+        return plain
+    exact = isinstance(found[0], Incompressible)
+    name, how = ("incompressible_penalty", "a penalty") if exact else ("incompressible", "a pressure")
+    i = effects.index(found[0])
+    effects[i] = make(name, bulk=found[0].bulk)
+    if not _suits(choice, tuple(effects)):
+        return plain
+    scene, changed = (
+        base.scene.model_copy(update={"effect": tuple(effects)}),
+        base.changed | {f"effect[{i}].name": name},
+    )
+    return base.varied("element", f"{text}, volume by {how}", choice=choice, scene=scene, changed=changed)
+
+
+def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
+    try:
+        solvers.check(choice.solver, solvers.settings(choice, choice.solver), effects, choice.solver)
+    except InputError:
+        return False
+    return True
+
+
+def _contact(base: Trial) -> Iterator[Trial]:
+    """Contact stiffer and softer, the distances to bones known better and less well; nothing where there is no contact."""
+    scene = base.scene
+    contact = among(scene.effects)
+    if contact is None:
+        return
+    for factor in _STIFFNESSES:
+        stiffness, key = factor * contact.stiffness, f"effect[{scene.effects.index(contact)}].stiffness"
+        stiffer, text = with_contact(scene, stiffness=stiffness), f"{stiffness:.3g} MPa/mm"
+        yield base.varied("contact stiffness", text, scene=stiffer, changed=base.changed | {key: text})
+    if known := [bone.distance_error for bone in scene.bone if bone.surface]:
+        for factor in _DISTANCES:
+            other, text = with_distances(scene, factor, "distance_error"), f"{factor * max(known):.3g} mm"
+            changed = base.changed | {"bone[*].distance_error": text}
+            yield base.varied("error of distances to bones", text, scene=other, changed=changed)
