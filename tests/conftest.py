@@ -11,9 +11,9 @@ import h5py  # noqa: F401 - before DOLFINx, whose HDF5 it would take for its own
 import pytest
 
 collect_ignore = ["foreign_solver.py", "run_notebook.py"]  # programs: they run where they are imported
-# Of these files each test takes long, and only those of one parameter, a case or an entry, have something in common; the tests of
-# any other file share its fixtures.
-SINGLE = ("test_every_case.py", "test_every_entry.py")
+# Of these files each test takes long, and only those of one parameter have something in common, a case or the first word of an
+# entry, whose bodies have the same compiled forms; the tests of any other file share its fixtures.
+SINGLE = {"test_every_case.py": "]", "test_every_entry.py": "_"}
 
 
 def pytest_configure() -> None:
@@ -43,9 +43,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file, _, test = nodeid.partition("::")
-            if not file.endswith(SINGLE):
+            end = SINGLE.get(Path(file).name)
+            if end is None:
                 return file
-            return file + (test[test.find("[") :] if "[" in test else test)
+            return file + (test[test.find("[") :].split(end)[0] if "[" in test else test)
 
     config.option.loadscopereorder = False
     return ByFile(config, log)

@@ -6,6 +6,7 @@ each place.
 
 import ast
 import collections
+import functools
 import itertools
 import re
 import sys
@@ -61,8 +62,9 @@ class Module(NamedTuple):
     tree: ast.Module
 
 
+@functools.cache
 def modules() -> list[Module]:
-    """Every file of the package, parsed."""
+    """Every file of the package, parsed once."""
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
     return [
         Module(str(path.relative_to(PACKAGE)), len(text.splitlines()), ast.parse(text)) for path, text in texts.items()

@@ -7,6 +7,7 @@ their rules: Gauss-Legendre in hexahedra for both, but other points in tetrahedr
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -107,50 +108,59 @@ BLOCK_RULES = (
     "they integrate by different rules, here of degree 9; this block differs by 4e-6 with those of degree 4, 1e-11 with 8 and "
     "4e-14 with 9"
 )
-# By element: the degree of both rules, the tolerance and its reason.
-RULES = {
-    "P1": (2, 1e-11, CONSTANT),
-    "P1/P1": (2, 1e-11, CONSTANT),
-    "P2": (9, 1e-11, BLOCK_RULES),
-    "P2/P0": (9, 1e-9, BAR_RULES),
-    "P2/P1": (9, 1e-10, BAR_RULES),
-    "Q1": (3, 1e-11, SAME_RULE),
-    "Q1/P0": (3, 1e-11, SAME_RULE),
-    "Q2": (5, 1e-11, SAME_RULE),
-    "Q2/Q1": (5, 1e-11, SAME_RULE),
+
+
+class Tolerance(NamedTuple):
+    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of the degree ``quadrature``, None: each
+    solver's own.
+    """
+
+    within: float
+    because: str
+    residual: float = 1e-13
+    quadrature: int | None = None
+
+
+TOLERANCES = {
+    "P1": Tolerance(1e-11, CONSTANT, 1e-14, 2),
+    "P1/P1": Tolerance(1e-11, CONSTANT, 1e-14, 2),
+    "P2": Tolerance(1e-11, BLOCK_RULES, 1e-14, 9),
+    "P2/P0": Tolerance(1e-9, BAR_RULES, 1e-14, 9),
+    "P2/P1": Tolerance(1e-10, BAR_RULES, 1e-14, 9),
+    "Q1": Tolerance(1e-11, SAME_RULE, 1e-14, 3),
+    "Q1/P0": Tolerance(1e-11, SAME_RULE, 1e-14, 3),
+    "Q2": Tolerance(1e-11, SAME_RULE, 1e-14, 5),
+    "Q2/Q1": Tolerance(1e-11, SAME_RULE, 1e-14, 5),
 }
-STEEPER = "F is constant, so that every rule is exact: Newton's residual of 1e-13 N, at forces of 0.01 to 3 N, and rounding remain"
+STEEPER = Tolerance(
+    1e-10,
+    "F is constant, so that every rule is exact: Newton's residual of 1e-13 N, at forces of 0.01 to 3 N, and rounding remain",
+)
 BENT = "bent and twisted at once"
 LEANING = "under its weight and a fluid that presses on one side, leaning on springs"
 
 
-BY_GAUSS = (
-    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains"
+BY_GAUSS = Tolerance(
+    1e-9,
+    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains",
+    1e-8,
+    5,
 )
 
 
-def opinion(
-    name: str,
-    title: str,
-    body: Callable[[], Body],
-    element: str,
-    within: float,
-    because: str,
-    residual: float = 1e-13,
-    quadrature: int | None = None,
-) -> Entry:
-    """An entry of a body that is solved twice, up to a ``residual`` [N] and by rules of the degree ``quadrature``."""
+def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
+    """An entry of a body that is solved twice."""
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
         title=f"{title}, by {element}: how far FEniCSx and scikit-fem differ",
         unit="1",
         measure=agreement,
-        given={"body": body, "element": element, "residual": residual, "quadrature": quadrature},
+        given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
         **control("in scikit-fem the first modulus is 1 % too large", error=0.01),
         truth=0.0,
-        within=within,
-        because=because,
+        within=tolerance.within,
+        because=tolerance.because,
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",
     )
@@ -158,7 +168,7 @@ def opinion(
 
 def specimen(name: str, words: str, block: Specimen) -> Entry:
     """A block of the groups homogeneous, fibres or loads; ``words`` after "A block"."""
-    return opinion(name, f"A block {words}", block.body, block.element, 1e-10, STEEPER)
+    return opinion(name, f"A block {words}", block.body, block.element, STEEPER)
 
 
 ACTIVE_BLOCK = Specimen(NEO + fibres.active(0.1), "P2/P1", "pulled", MU, loads=(dead(MU),))
@@ -189,13 +199,11 @@ ENTRIES = (
     specimen("tension", "with fibres of constant tension, fixed short", fibres.muscle(fibres.tension(), 0.9)),
     specimen("taut", "of prestretched muscle, fixed", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
     specimen("neo_hooke", "of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
-    opinion("patch", PATCH, partial(patch, "Q2/Q1", 2), "Q2/Q1", 1e-10, STEEPER),
-    opinion("cook", COOK, partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4), "Q2/Q1", 1e-9, BY_GAUSS, 1e-8, 5),
-    opinion("homogeneous", EXTENDED, PULLED_BLOCK, "P2/P1", 1e-11, CONSTANT, 1e-14, 4),
+    opinion("patch", PATCH, partial(patch, "Q2/Q1", 2), "Q2/Q1", STEEPER),
+    opinion("cook", COOK, partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4), "Q2/Q1", BY_GAUSS),
+    opinion("homogeneous", EXTENDED, PULLED_BLOCK, "P2/P1", Tolerance(1e-11, CONSTANT, 1e-14, 4)),
     *(
-        opinion(
-            name, title, partial(built, acting, mesh, prescribed, element), element, within, because, 1e-14, quadrature
-        )
+        opinion(name, title, partial(built, acting, mesh, prescribed, element), element, TOLERANCES[element])
         for name, title, acting, mesh, prescribed, element in (
             ("bar_p2p1", f"A neo-Hookean bar {BENT}", (NEO_HOOKE,), BAR, TURNED, "P2/P1"),
             ("bar_q1p0", f"A neo-Hookean bar {BENT}", (NEO_HOOKE,), BAR, TURNED, "Q1/P0"),
@@ -209,6 +217,5 @@ ENTRIES = (
             ("loads", f"A block of curved cells {LEANING}", LOADED, CURVED_BLOCK, STANDING, "Q2/Q1"),
             ("loads_p2", f"A block {LEANING}", LOADED, BLOCK, STANDING, "P2"),
         )
-        for quadrature, within, because in (RULES[element],)
     ),
 )

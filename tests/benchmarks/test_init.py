@@ -21,6 +21,7 @@ def test_parameters_are_where_asv_looks_for_them() -> None:
     assert track() == 1.0
 
 
+@pytest.mark.slow
 def test_asv_finds_the_suite_whole() -> None:
     pytest.importorskip("asv", reason="asv is not installed")
     words = [sys.executable, "-m", "asv", "check", "--config", str(ROOT / "benchmarks" / "asv.conf.json")]

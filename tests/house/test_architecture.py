@@ -3,33 +3,11 @@
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 
 import counts
 import pytest
+from counts import ORDER, PACKAGE, ROOT
 
-ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "fem_reference"
-
-# A package imports only what stands before it (or in itself).
-ORDER = [
-    "foundations",
-    "io",
-    "effects",
-    "geometry",
-    "scenes",
-    "problems",
-    "runs",
-    "solvers",
-    "metrics",
-    "assessment",
-    "export",
-    "report",
-    "studies",
-    "verification",
-    "cli",
-]
 # These see runs and never who made them.
 BLIND_TO_SOLVERS = ["metrics", "assessment", "report"]
 DOORS = {
@@ -58,13 +36,6 @@ TRUTHS_MAY = {"numpy", "scipy", "math", "dataclasses", "collections", "typing", 
 LINES, FUNCTION, ARGUMENTS = 300, 40, 6
 
 
-def sources() -> Iterator[tuple[str, ast.Module, str]]:
-    """Every module of the package: where it is in it, parsed, and its text."""
-    for path in sorted(PACKAGE.rglob("*.py")):
-        text = path.read_text(encoding="utf-8")
-        yield str(path.relative_to(PACKAGE)), ast.parse(text), text
-
-
 def imports(tree: ast.AST) -> set[str]:
     """Every module that is imported, anywhere."""
     found = set()
@@ -87,7 +58,7 @@ def test_packages_import_in_one_order_and_heavy_ones_have_one_door() -> None:
     found = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
     assert found == {*ORDER, "__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
     wrong = []
-    for name, tree, _ in sources():
+    for name, _, tree in counts.modules():
         place = name.split("/")[0]
         later = ORDER[ORDER.index(place) + 1 :] if place in ORDER else []
         wrong += [f"{name} imports {other}, which stands after it" for other in own(tree) & set(later)]
@@ -105,9 +76,9 @@ def test_packages_import_in_one_order_and_heavy_ones_have_one_door() -> None:
 
 def test_files_and_functions_stay_small_and_only_the_command_line_prints() -> None:
     wrong = []
-    for name, tree, text in sources():
-        if len(text.splitlines()) > LINES:
-            wrong.append(f"{name} has {len(text.splitlines())} lines")
+    for name, lines, tree in counts.modules():
+        if lines > LINES:
+            wrong.append(f"{name} has {lines} lines")
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
                 parameters = {arg.arg for arg in (*node.args.args, *node.args.kwonlyargs)} - {"self", "cls"}
