@@ -114,19 +114,6 @@ def _show_progress(*, on: bool) -> None:
     log.handlers[:] = [handler]
 
 
-def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
-    """Nested facts as indented lines."""
-    printed = []
-    for key, value in facts.items():
-        if isinstance(value, dict):
-            printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
-        elif isinstance(value, list):
-            printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
-        else:
-            printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
-    return printed
-
-
 def out(options: argparse.Namespace) -> Path:
     """The folder of pages and stored runs."""
     return options.out if options.out is not None else Path("reports")

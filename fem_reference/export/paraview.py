@@ -109,23 +109,17 @@ class _Frames:
     def blocks(self, i: int) -> Tree:
         """Those of the frame of index ``i``."""
         number, rest = self.reference.numbers[i], self.setup.surface
-        moved = {bone.name: apply(bone.pose(number), bone.surface.points) for bone in self.setup.bones}
-        bones = {
-            bone.name: DataBlock(
-                bone.surface.points, bone.surface.triangles, _moved(bone.surface.points, moved[bone.name])
+        bones = {}
+        for bone in self.setup.bones:
+            points = bone.surface.points
+            bones[bone.name] = DataBlock(
+                points, bone.surface.triangles, _moved(points, apply(bone.pose(number), points))
             )
-            for bone in self.setup.bones
-        }
-        attachments = {
-            one.attachment: _part(rest, one.vertices, self.reference.positions[i]) for one in self.setup.attached
-        }
+        now = self.reference.positions[i]
+        attachments = {one.attachment: _part(rest, one.vertices, now) for one in self.setup.attached}
         runs = {run.name: self._run(run, i) for run in self.comparison.candidates}
-        return {
-            "reference": self._run(self.reference, i),
-            "candidates": runs,
-            "bones": bones,
-            "attachments": attachments,
-        }
+        own = self._run(self.reference, i)
+        return {"reference": own, "candidates": runs, "bones": bones, "attachments": attachments}
 
     def _run(self, run: Run, i: int) -> dict[str, DataBlock]:
         """The blocks of a ``run`` at a frame."""
@@ -147,23 +141,24 @@ class _Frames:
 
     def _at_surface(self, run: Run, i: int) -> dict[str, Any]:
         """Arrays at the vertices of the reference that follow from its state, by name."""
-        if run is not self.reference or self.results is None or self.within is None:
+        frame = run.numbers[i]
+        if run is not self.reference or self.results is None or self.within is None or frame not in self.results.frames:
             return {}
-        frame, tets = run.numbers[i], self.within[0]
-        if frame not in self.results.frames:
-            return {}
-        names = [name for name in self.results.names(self.results.states[frame]) if name in _EVALUATED]
-        return self.results.evaluate_in(tets, self.within[1], frame, names)
+        return self.results.evaluate_in(*self.within, frame, _names(self.results, frame))
 
 
 def interior(made: Results, frame: float) -> DataBlock:
     """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
     mesh, count = made.mesh, len(made.mesh.tets)
-    names = [name for name in made.names(made.states[frame]) if name in _EVALUATED]
-    cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, names)
+    cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
     return DataBlock(mesh.points, mesh.tets, {"displacement": _at_nodes(mesh, made.states[frame].displacement)}, cells)
+
+
+def _names(made: Results, frame: float) -> list[str]:
+    """The arrays of a frame that are written, beside displacement."""
+    return [name for name in made.names(made.states[frame]) if name in _EVALUATED]
 
 
 def _at_nodes(mesh: TetMesh, displacement: Floats) -> Floats:

@@ -11,8 +11,7 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corner_areas, unit_normals
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.pieces import Pieces, cut
-from fem_reference.geometry.skins import Skin, embedded, points, spacing
+from fem_reference.geometry.skins import Pieces, Skin, cut, embedded, points, spacing
 
 # A part that faces more than 120 degrees away from an attached part is on the other side of a thin body.
 _SAME_SIDE = -0.5

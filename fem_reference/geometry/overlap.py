@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.geometry.distance import distances, inside
-from fem_reference.geometry.pieces import edge_lengths, quartered
+from fem_reference.geometry.skins import edge_lengths, quartered
 
 # The first cubes are at most this long [mm], and at most the longest extent of the surface over this number.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20

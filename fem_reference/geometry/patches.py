@@ -6,7 +6,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.pieces import edge_lengths
+from fem_reference.geometry.skins import edge_lengths
 
 # The most triangles of a draped patch: those of a patch of some metres.
 _MOST_TRIANGLES = 2**20

@@ -154,10 +154,8 @@ def _moved(versions: Versions) -> Drawing | None:
 
 def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:
     """The frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing."""
-    current, found = versions.current, versions.place
-    if found is None or not current.candidate.has_surface:
-        return [], ""
-    return gallery.figures(setup, current.candidate.surface, _shots(versions, found[0]))
+    run, found = versions.current.candidate, versions.place
+    return gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:

@@ -10,11 +10,10 @@ from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.drawings import colour_of
-from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.pages import Headlines, Page, template
 from fem_reference.report.sections import facts_of, sections
 from fem_reference.report.sections.origin import changes
 from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, known, summary
-from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
 from fem_reference.runs.store import Run, seconds_per_frame
@@ -80,6 +79,8 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "error": error and error.worst,
         "viewer": view(comparison),
         "colours": gallery.ramp(),
+        "ticks": gallery.ticks,
+        "pictures": gallery.of_comparison,
         "find": find,
         "ratio": ratio,
         "label_of": label_of,

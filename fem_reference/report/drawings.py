@@ -9,12 +9,14 @@ from html import escape
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter
 from PIL import Image
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
@@ -110,6 +112,12 @@ def logarithmic(axes: Axes) -> None:
     axes.set(xscale="log", yscale="log")
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
+
+
+def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
+    """The ``sizes`` and ``errors`` (n,) where an error can stand on a logarithmic axis."""
+    kept = np.isfinite(errors) & (errors > 0)
+    return sizes[kept], errors[kept]
 
 
 def plain_numbers(axis: Any) -> None:

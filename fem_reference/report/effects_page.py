@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment import omissions
-from fem_reference.assessment.fronts import COSTS
 from fem_reference.assessment.omissions import Ablation, CaseOmissions, Omission
 from fem_reference.metrics import described
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
 from fem_reference.report.pages import Page
-from fem_reference.report.words import duration, listed, number, title_of, words
+from fem_reference.report.study_page import title_of
+from fem_reference.report.words import duration, listed, number, words
 
 MAIN = "surface_deviation.rms"
 # By name the head of a column of the table.
@@ -28,7 +28,7 @@ def page(found: CaseOmissions) -> Page:
         "measures": [name for name in omissions.MEASURES if name in found.units],
         "heads": HEADS,
         "phases": phases(found),
-        "counts": {name: count_title(name) for name in omissions.COUNTS},
+        "counts": {name: title_of(name) for name in omissions.COUNTS},
         "predicted": any(one.predicted for ablation in found.ablations for one in ablation.omissions),
         "sentences": sentences,
         "label": label,
@@ -40,15 +40,6 @@ def page(found: CaseOmissions) -> Page:
     }
     title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
     return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))
-
-
-def count_title(name: str) -> str:
-    """The name of a count in words.
-
-    >>> count_title("newton_iterations"), count_title("load_steps")
-    ('Newton iterations', 'load steps')
-    """
-    return COSTS[name][0] if name in COSTS else words(name)
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
@@ -165,9 +156,7 @@ def text(found: CaseOmissions) -> str:
     lines = [f"{found.case}: {'known to: ' + ', '.join(known) if known else 'no error bars: ' + found.unknown}"]
     for ablation in found.ablations:
         whole = ablation.whole
-        counts = [
-            f"{number(whole.costs[name])} {count_title(name)}" for name in omissions.COUNTS if name in whole.costs
-        ]
+        counts = [f"{number(whole.costs[name])} {title_of(name)}" for name in omissions.COUNTS if name in whole.costs]
         time = duration(None if math.isnan(whole.seconds) else whole.seconds)
         lines.append(f"  {', '.join([f'{ablation.name}: {whole.status}', f'{time} of processor time', *counts])}")
         lines += [f"    {sentence}" for sentence in sentences(found, ablation)]

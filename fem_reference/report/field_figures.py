@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fem_reference.assessment.comparison import Comparison, Convergence
+from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
-from fem_reference.report.drawings import LOOK, PALETTE, REFERENCE, Drawing, drawn, webp
+from fem_reference.report.drawings import LOOK, PALETTE, REFERENCE, Drawing, drawn, positive, webp
 from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
@@ -43,25 +43,18 @@ def drawings(example: Comparison) -> list[Drawing]:
 
 def convergence(example: Comparison) -> Drawing:
     """Error over number of cells, a line for each element."""
+    title = "Error as the mesh is refined"
+    lines = [(one.element, *positive(np.array(one.cells, float), np.array(one.errors))) for one in example.ladders]
+    if not any(len(cells) for _, cells, _ in lines):
+        return Drawing(title, missing="no error that is a positive number")
 
     def draw(axes: Axes) -> None:
-        for i, ladder in enumerate(example.ladders):
-            cells, errors = _positive(ladder)
-            axes.loglog(cells, errors, "o-", color=PALETTE[i % len(PALETTE)], label=ladder.element)
+        for i, (element, cells, errors) in enumerate(lines):
+            axes.loglog(cells, errors, "o-", color=PALETTE[i % len(PALETTE)], label=element)
         axes.set_xlabel("cells")
         axes.set_ylabel("error")
 
-    title = "Error as the mesh is refined"
-    if not any(len(_positive(ladder)[0]) for ladder in example.ladders):
-        return Drawing(title, missing="no error that is a positive number")
     return _svg(f"{example.scene.name}-convergence", title, draw)
-
-
-def _positive(ladder: Convergence) -> tuple[Floats, Floats]:
-    """Cells and errors of the meshes whose error can stand on a logarithmic axis."""
-    cells, errors = np.array(ladder.cells, float), np.array(ladder.errors, float)
-    kept = np.isfinite(errors) & (errors > 0)
-    return cells[kept], errors[kept]
 
 
 def _lines(example: Comparison) -> list[Drawing]:

@@ -67,6 +67,11 @@ def shots(comparison: Comparison) -> list[Shot]:
     return chosen + [shot for run in comparison.candidates for shot in _worst(comparison, run)]
 
 
+def of_comparison(comparison: Comparison) -> tuple[list[Figure], str]:
+    """The figures of the runs of a comparison, each at its worst frame, or none and what is missing."""
+    return figures(comparison.setup, comparison.reference.surface, shots(comparison))
+
+
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Figure], str]:
     """The figures of ``wanted``, or none and what is missing."""
     try:

@@ -1,5 +1,5 @@
-"""A page as a record, how one is written, and the head in which it describes itself: the index shows that, and a page is
-written over only by the command that made it.
+"""A page as a record, its template, how it is written, and the head in which it describes itself: the index shows that, and a page
+is written over only by the command that made it.
 """
 
 import base64
@@ -9,16 +9,19 @@ import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
+from functools import cache
 from html import escape
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+import jinja2
 from PIL import Image
 
+from fem_reference.foundations.markup import exact
 from fem_reference.io import files
 from fem_reference.report.drawings import webp
-from fem_reference.report.templates import template
+from fem_reference.report.words import duration, number, words
 
 # Where the facts stand in the frame of all pages (base.html), and where the command that made it.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
@@ -132,3 +135,22 @@ def small_picture(text: str) -> str:
             return webp(small, 75)
     except (OSError, ValueError):
         return ""
+
+
+def template(name: str) -> jinja2.Template:
+    """The template in the file ``name`` beside this one: its contents are escaped, and a name that it lacks is an error."""
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """The environment of the templates, each of which is compiled when it is first asked for."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
+    return environment

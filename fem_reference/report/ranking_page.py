@@ -14,6 +14,7 @@ from fem_reference.io.texts import finite
 from fem_reference.metrics import described
 from fem_reference.report.drawings import PALETTE, REFERENCE, Drawing, drawn, logarithmic
 from fem_reference.report.pages import Page
+from fem_reference.report.words import ratio
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
@@ -30,7 +31,7 @@ def page(table: Table) -> Page:
         "table": table,
         "columns": COLUMNS,
         "over_all": OVER_ALL,
-        "per_second": per_second,
+        "ratio": ratio,
         "report_speeds": report_speeds(),
         "drawing": _drawing(table),
     }
@@ -38,22 +39,12 @@ def page(table: Table) -> Page:
     return Page("ranking", "Table 5.1 in numbers", (("", "", said),), "ranking_page.html", contents, facts(table))
 
 
-def per_second(seconds: float | None) -> float | None:
-    """Frames in a second, None where the time of one is not known."""
-    return 1 / seconds if seconds else None
-
-
 def facts(table: Table) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     return {
         "scenarios": [
-            {
-                "case": one.case,
-                "triangles": one.triangles,
-                "travel_mm": one.travel,
-                "reference": one.reference.status,
-                "message": one.reference.message,
-            }
+            {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
+            | {"reference": one.reference.status, "message": one.reference.message}
             for one in table.scenarios
         ],
         "missing": table.missing,

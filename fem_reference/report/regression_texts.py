@@ -43,8 +43,7 @@ def text(check: Check) -> str:
     for one in _of(check, "inconclusive"):
         silent.setdefault(one.why, []).append(_named(one))
     lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in silent.items()])
-    lines += [f"note: {note}" for note in check.notes]
-    lines += [f"reference: doubtful, {why}" for why in check.doubts]
+    lines += _notes(check)
     if _of(check, "fail"):
         lines.append(
             f"what is nearer to the reference and what is further: compare {check.case} --candidate ... --against the baseline"
@@ -57,13 +56,8 @@ def markdown(check: Check) -> str:
     """A heading with the verdict, both answers, a table of at most ``MOST_ROWS`` judgements, the worst first, and the notes."""
     shown = check.judgements[:MOST_ROWS]
     lines = [f"### {check.word}: {_escaped(check.candidate)} on {_escaped(check.case)}", ""]
-    lines += [
-        *(f"- {answer}" for answer in _answers(check)),
-        *(f"- note: {_escaped(note)}" for note in check.notes),
-        *(f"- reference: doubtful, {_escaped(why)}" for why in check.doubts),
-        "",
-    ]
-    lines += [f"| {' | '.join(_COLUMNS)} |", f"|{'---|' * len(_COLUMNS)}"]
+    lines += [f"- {_escaped(line)}" for line in (*_answers(check), *_notes(check))]
+    lines += ["", f"| {' | '.join(_COLUMNS)} |", f"|{'---|' * len(_COLUMNS)}"]
     lines += [f"| {' | '.join(map(_escaped, _cells(one)))} |" for one in shown]
     more = len(check.judgements) - len(shown)
     failed = sum(one.word == "fail" for one in check.judgements[MOST_ROWS:])
@@ -122,6 +116,10 @@ def _suite(name: str, counts: dict[str, str]) -> tuple[ElementTree.Element, Elem
 def _xml(root: ElementTree.Element) -> str:
     ElementTree.indent(root, " ")
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _notes(check: Check) -> list[str]:
+    return [*(f"note: {note}" for note in check.notes), *(f"reference: doubtful, {why}" for why in check.doubts)]
 
 
 def _of(check: Check, word: str) -> list[Judgement]:

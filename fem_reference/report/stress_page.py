@@ -22,16 +22,9 @@ _LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # of the axes in a drawing of 300
 
 def page(found: Stress) -> Page:
     """The page of hard cases."""
-    contents = {
-        "stress": found,
-        "verdicts": VERDICTS,
-        "marks": _MARKS,
-        "summary": summary(found),
-        "picture": picture,
-        "history": history,
-    }
-    said = (("", "", summary(found)),)
-    return Page("hard cases", "Hard cases", said, "stress_page.html", contents, stress.facts(found))
+    said, drawn = summary(found), {"picture": picture, "history": history}
+    contents = {"stress": found, "verdicts": VERDICTS, "marks": _MARKS, "summary": said} | drawn
+    return Page("hard cases", "Hard cases", (("", "", said),), "stress_page.html", contents, stress.facts(found))
 
 
 def summary(found: Stress) -> str:

@@ -11,7 +11,7 @@ from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocat
 
 from fem_reference.assessment.catalogue import Result
 from fem_reference.foundations.mesh import Floats
-from fem_reference.report.drawings import PALETTE, Drawing, drawn
+from fem_reference.report.drawings import PALETTE, Drawing, drawn, positive
 from fem_reference.report.words import number, words
 
 PASS, FAIL = "#14713a", "#b3261e"
@@ -124,6 +124,4 @@ def convergence(one: Result) -> Drawing:
 def _errors(one: Result) -> tuple[Floats, Floats]:
     """Sizes and errors of the meshes whose error is a positive number."""
     sizes, values = np.array(one.finding.ladder, float).reshape(-1, 2).T
-    errors = np.abs(values - one.truth)
-    kept = np.isfinite(errors) & (errors > 0)
-    return sizes[kept], errors[kept]
+    return positive(sizes, np.abs(values - one.truth))

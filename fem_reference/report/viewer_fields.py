@@ -94,9 +94,8 @@ class Fields:
             if run.name in values:
                 share = np.nan_to_num(values[run.name]) / (_top(list(values.values())) or 1.0)
                 level = np.round(np.sign(share) * np.sqrt(np.minimum(np.abs(share), 1)) * _LEVELS).astype(np.int8)
-                found[name] = np.diff(
-                    level.view(np.uint8), axis=0, prepend=np.zeros_like(level[:1]).view(np.uint8)
-                ).tobytes()
+                whole = level.view(np.uint8)
+                found[name] = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).tobytes()
         return found
 
     def most(self, run: Run) -> dict[str, list[float]]:
@@ -120,9 +119,8 @@ class Fields:
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
         """The lines, and the least and greatest stretch of a piece of these at ``points`` (f, m, 3) [mm] of each run."""
         lines, ends = self.lines[0], self.lines[0].offsets
-        inside = np.delete(
-            np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1
-        )  # pieces: from each point to the next
+        # Pieces go from each point of a line to the next.
+        inside = np.delete(np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1)
 
         def lengths(places: Floats) -> Floats:
             return np.asarray(np.linalg.norm(np.diff(places, axis=-2), axis=-1)[..., inside])
@@ -131,12 +129,8 @@ class Fields:
         stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
         known = stretches[np.isfinite(stretches)]
         low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))  # one piece does not set the scale
-        return {
-            "lines": np.diff(ends).tolist(),
-            "rest": np.round(rest, 5).tolist(),
-            "low": min(low, 1.0),
-            "high": max(high, 1.0),
-        }
+        scale = {"low": min(low, 1.0), "high": max(high, 1.0)}
+        return {"lines": np.diff(ends).tolist(), "rest": np.round(rest, 5).tolist(), **scale}
 
 
 def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import triangle_areas
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.patches import draped, fan
-from fem_reference.geometry.pieces import edge_lengths
+from fem_reference.geometry.skins import edge_lengths
 
 BALL = shapes.sphere(3, 30.0)
 ANGLES = np.linspace(0, 2 * np.pi, 9)[:-1]

@@ -7,10 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from jinja2 import UndefinedError
+from jinja2 import TemplateNotFound, UndefinedError
 
 from fem_reference.report import index_page, pages
+from fem_reference.report.pages import template
 from tests.report.stamped import put
+
+CONTENTS = {"title": "A <title>", "entries": (), "others": ("a&b.html",)}
 
 
 def test_a_page_says_of_itself_what_it_was_given(tmp_path: Path) -> None:
@@ -94,3 +97,31 @@ def test_numbers_stand_beside_the_page_under_its_name_or_their_own(tmp_path: Pat
     names = [sorted(path.name for path in (tmp_path / name).iterdir()) for name in ("one", "two")]
     assert names == [["page.csv", "page.html", "page.json"], ["measures.csv", "measures.json", "page.html"]]
     assert json.loads((tmp_path / "two" / "measures.json").read_text()) == [1]
+
+
+def test_contents_are_escaped() -> None:
+    text = template("index_page.html").render(CONTENTS)
+    assert "<title>A &lt;title&gt;</title>" in text
+    assert '<a href="a&amp;b.html">' in text
+
+
+def test_a_missing_name_and_a_missing_template_are_errors() -> None:
+    with pytest.raises(UndefinedError, match="others"):
+        template("index_page.html").render({name: CONTENTS[name] for name in ("title", "entries")})
+    with pytest.raises(TemplateNotFound):
+        template("nowhere.html")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (float("nan"), "mm", '<span class="bad">not a number</span>'),
+        (None, "", "\N{EN DASH}"),
+        (2.5, "mm3", '2.50&#8239;<span class="unit">mm³</span>'),
+        (2.5, "1", "2.50"),
+    ],
+)
+def test_a_number_stands_with_its_unit(value, unit, text) -> None:
+    assert str(template("measured.html").module.figure_of(value, unit)).strip() == text
+    known = str(template("measured.html").module.if_known(value, unit)).strip()
+    assert known == ("\N{EN DASH}" if value is None or value != value else text)

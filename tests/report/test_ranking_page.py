@@ -5,8 +5,6 @@ import math
 import re
 from dataclasses import replace
 
-import pytest
-
 from fem_reference import report
 from fem_reference.report import ranking_page
 from fem_reference.runs.store import Outcome
@@ -24,11 +22,12 @@ def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> Non
 
 def test_times_are_drawn_in_the_unit_that_their_axis_names() -> None:
     made = table(solver_result("case0", 3.0, seconds=0.02), solver_result("case1", 4.0, seconds=0.05))
-    drawing = re.search("<svg.*?</svg>", ranking_page.page(made).html(), re.DOTALL)
+    html = ranking_page.page(made).html()
+    drawing = re.search("<svg.*?</svg>", html, re.DOTALL)
     assert drawing is not None
     texts = re.findall(r"<text[^>]*>([^<]*)<", drawing[0])
     assert texts[:3] == ["20", "50", "time for a frame number, ms"]  # 0.02 and 0.05 s
-    assert ranking_page.per_second(0.02) == pytest.approx(50)
+    assert "<td>50<small>20 ms</small>" in html  # frames in a second
 
 
 def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> None:
