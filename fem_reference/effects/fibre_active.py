@@ -17,7 +17,7 @@ class FibreActive(Ramped, Energy):
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
-    Meant for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
+    Valid for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

@@ -18,7 +18,7 @@ class FibrePassive(Energy):
     fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
 
-    Meant for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
+    Valid for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
     data of longer fibres stands behind this law. Slack fibres are without limit.
     """
 

@@ -68,7 +68,7 @@ def circle(points: Floats) -> float:
     return float(np.sqrt(c + a**2 + b**2))
 
 
-# What is read from nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
+# Readings of nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
 # to the nodes of the inner face [mm], and the distance between the curved faces, halfway between the ends [mm].
 READINGS: dict[str, Reading] = {
     "moment": lambda _, state: float(state.moments["y1"][2] / WIDTH),
