@@ -15,7 +15,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import SYMMETRY, clamped, control, find, neo_hooke
+from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, neo_hooke
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
@@ -134,8 +134,7 @@ ENTRIES = (
             because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
             kind="closed form",
             source="Hertz 1882; validation/hertz.py",
-            slow=True,
-            slow_negative_control=True,
+            **SLOW,
         )
         for name, words, unit, value in (
             ("force", "its force", "N", force),
