@@ -1,10 +1,11 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.2 and 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length and no surface, and is judged on that length alone. A shortest path takes the
-shorter path round: where ends turn past what is opposite, it changes sides.
+Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
+points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on its length alone. A
+shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Self
@@ -16,12 +17,14 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.units import Angle, Force
 from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
+from fem_reference.solvers.common.hill import Hill
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.solvers.common.state_checks import Trouble
 
@@ -48,16 +51,43 @@ class CylinderOn(Rod):
     bone: str
 
 
+class HillSettings(Record):
+    """Lines as Hill-type muscles with tendons, in equilibrium at each frame (5.1): all alike, and together of a ``max_force``.
+
+    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just slack;
+    ``pennation``: their angle; ``activation``: from 0 to 1.
+    """
+
+    max_force: Force
+    fibre_share: Annotated[float, Field(gt=0, lt=1)]
+    pennation: Annotated[Angle, Field(ge=0, lt=1.2)] = 0.0
+    activation: Annotated[float, Field(ge=0, le=1)] = 1.0
+
+    def muscles(self, lengths: Floats) -> tuple[Hill, ...]:
+        """The muscle of each line (k,) of these ``lengths`` [mm] at the first frame."""
+        share, angle = self.fibre_share, self.pennation
+        return tuple(
+            Hill.model_construct(
+                max_force=self.max_force / len(lengths),
+                optimal_length=share * length,
+                slack_length=(1 - share * math.cos(angle)) * length,
+                pennation=angle,
+            )
+            for length in lengths.tolist()
+        )
+
+
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight path would cross it.
+    line goes around, from one fixed point to the next, where the straight path would cross it. ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
     sphere: SphereOn | None = None
     cylinder: CylinderOn | None = None
+    hill: HillSettings | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -111,6 +141,11 @@ class Shortest:
         self.cost = {"seconds_compile": 0.0}
         self.inside: Trouble | None = None
         self.found = Frame(problem.frames[0], None)
+        first = _paths(self.wrap, self.lines.at(problem.frames[0]), problem.frames[0])[0].lengths
+        self.hill = settings.hill
+        self.muscles = (
+            () if self.hill is None else self.hill.muscles(first.reshape(len(self.lines.fixed), -1).sum(axis=1))
+        )
 
     def move(self, number: int) -> None:
         """Find the paths at a frame."""
@@ -118,7 +153,16 @@ class Shortest:
         if self.wrap is not None and (inside := _inside(self.wrap, fixed, number)):
             self.inside = Trouble("diverged", inside)
         else:
-            self.found = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+            self.found, lengths = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+            self.found.scalars.update(self._forces(lengths))
+
+    def _forces(self, lengths: Floats) -> dict[str, float]:
+        """The force of all lines [N] of these lengths (k,) [mm], and the mean length of their fibres over the optimal one."""
+        if self.hill is None:
+            return {}
+        pairs = zip(self.muscles, lengths.tolist(), strict=True)
+        found = np.array([muscle.static(length, self.hill.activation) for muscle, length in pairs])
+        return {"muscle_force": float(found[:, 0].sum()), "fibre_length_mean": float(found[:, 1].mean())}
 
     def trouble(self) -> Trouble | None:
         """The trouble with a fixed point inside the obstacle; None without."""
@@ -155,13 +199,15 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     return lines, wrap
 
 
-def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> Frame:
-    """The lines with as many points as the fibres have; ``lost_by_chords_max`` [mm], how much shorter than its path one is so."""
+def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> tuple[Frame, Floats]:
+    """The lines with as many points as the fibres have, and the lengths of their paths (k,) [mm]; ``lost_by_chords_max`` [mm]: the
+    greatest length that chords cut off a path.
+    """
     paths, pose = _paths(wrap, fixed, number)
     points = apply(pose, paths.at(lines.part, lines.share))
     lengths = paths.lengths.reshape(len(fixed), -1).sum(axis=1)
     lost = float((lengths - fibres.lengths(points)).max())
-    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost})
+    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost}), lengths
 
 
 def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats]:
