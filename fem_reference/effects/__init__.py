@@ -237,7 +237,7 @@ class FieldEffect(Record):
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
         """The term times ``test``, integrated by parts where it has second derivatives; linear in ``test``, affine in ``psi``."""
-        raise NotImplementedError(f"{type(self).__name__} has no weak form")
+        return self.strong(psi, place) * test.value
 
     def strong(self, psi: FieldState, place: Place) -> Any:
         """The term itself, as a residual-based stabilisation needs it."""

@@ -31,8 +31,8 @@ def helix(cells: Ints, points: Floats) -> Floats:  # noqa: ARG001
 
 @dataclass(frozen=True)
 class Heart:
-    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension wrong by the
-    factors ``stiff`` and ``active``.
+    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension wrong by
+    the factors ``stiff`` and ``active``.
     """
 
     element: str
