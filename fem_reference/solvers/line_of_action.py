@@ -5,7 +5,6 @@ points it is as short as it can be. It has a length, with ``hill`` also a force,
 shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Self
@@ -17,14 +16,13 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
-from fem_reference.foundations.units import Angle, Force
 from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
-from fem_reference.solvers.common.hill import Hill
+from fem_reference.solvers.common.hill import HillSettings
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.solvers.common.state_checks import Trouble
 
@@ -49,32 +47,6 @@ class CylinderOn(Rod):
     """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
 
     bone: str
-
-
-class HillSettings(Record):
-    """Lines as Hill-type muscles with tendons, in equilibrium at each frame (5.1): all alike, and together of a ``max_force``.
-
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just slack;
-    ``pennation``: their angle; ``activation``: from 0 to 1.
-    """
-
-    max_force: Force
-    fibre_share: Annotated[float, Field(gt=0, lt=1)]
-    pennation: Annotated[Angle, Field(ge=0, lt=1.2)] = 0.0
-    activation: Annotated[float, Field(ge=0, le=1)] = 1.0
-
-    def muscles(self, lengths: Floats) -> tuple[Hill, ...]:
-        """The muscle of each line (k,) of these ``lengths`` [mm] at the first frame."""
-        share, angle = self.fibre_share, self.pennation
-        return tuple(
-            Hill.model_construct(
-                max_force=self.max_force / len(lengths),
-                optimal_length=share * length,
-                slack_length=(1 - share * math.cos(angle)) * length,
-                pennation=angle,
-            )
-            for length in lengths.tolist()
-        )
 
 
 class LineSettings(Record):
