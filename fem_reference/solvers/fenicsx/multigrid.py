@@ -23,8 +23,9 @@ _STALE = 15
 
 
 class _Blocks:
-    """The block triangular preconditioner: ``cycle`` of the displacements, ``mass`` of the pressures, and their ``coupling``. It does
-    not own the solver that owns it: PETSc frees neither in a circle.
+    """The block triangular preconditioner: ``cycle`` of the displacements, ``mass`` of the pressures, and their ``coupling``.
+
+    PETSc's solver keeps it, so it must not refer to that solver: neither would ever be freed.
     """
 
     cycle: PETSc.PC
