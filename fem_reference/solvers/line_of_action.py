@@ -153,7 +153,7 @@ class Shortest:
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
-    return each(Shortest(problem, settings), problem.frames, sink)
+    return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
@@ -237,9 +237,8 @@ def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
 def _along(points: Floats, places: list[float]) -> Floats:
     """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return np.column_stack(
-        [np.interp(np.array(places) * travelled[-1], travelled, points[:, axis]) for axis in range(3)]
-    )
+    wanted = np.array(places) * travelled[-1]
+    return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
@@ -256,12 +255,8 @@ def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
         raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
-    away = np.array(
-        [
-            np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)
-            for attached in problem.attached
-        ]
-    )
+    ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
+    away = [np.linalg.norm(points[:, None] - end, axis=2).min(axis=1) for end in ends]
     found = [_index(problem.bones, attached.bone.name, place) for attached in problem.attached]
     return np.array(found)[np.argmin(away, axis=0)]
 
