@@ -1,7 +1,6 @@
 """The command line: the only place that prints, shows progress and exits."""
 
 import argparse
-import builtins
 import json
 import logging
 import os
@@ -113,19 +112,6 @@ def _show_progress(*, on: bool) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(message)s"))
     log.handlers[:] = [handler]
-
-
-def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
-    """Nested facts as indented lines."""
-    printed = []
-    for key, value in facts.items():
-        if isinstance(value, dict):
-            printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
-        elif isinstance(value, builtins.list):  # list is a module here, once imported
-            printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
-        else:
-            printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
-    return printed
 
 
 def out(options: argparse.Namespace) -> Path:

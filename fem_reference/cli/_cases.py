@@ -158,3 +158,16 @@ def status(results: Iterable[Comparison]) -> int:
     if any(run.outcome.status != "converged" for result in found for run in result.runs):
         return SOLVER_FAILED
     return VERDICT_FAIL if any(result.word == "fail" for result in found) else DONE
+
+
+def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
+    """Nested facts as indented lines."""
+    printed = []
+    for key, value in facts.items():
+        if isinstance(value, dict):
+            printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
+        elif isinstance(value, list):
+            printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
+        else:
+            printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
+    return printed

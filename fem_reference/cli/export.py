@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from fem_reference import export
-from fem_reference.cli import DONE, SOLVER_FAILED, lines, out, write_output
-from fem_reference.cli._cases import checked_bench, choose, scene_of
+from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.cli._cases import checked_bench, choose, lines, scene_of
 from fem_reference.cli._parser import share
 from fem_reference.export import paraview
 from fem_reference.export.folders import check

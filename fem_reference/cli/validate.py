@@ -4,8 +4,8 @@ import argparse
 from typing import Any
 
 from fem_reference import solvers
-from fem_reference.cli import DONE, lines, write_output
-from fem_reference.cli._cases import checked_bench, own_candidates, scene_of
+from fem_reference.cli import DONE, write_output
+from fem_reference.cli._cases import checked_bench, lines, own_candidates, scene_of
 from fem_reference.cli._parser import share
 from fem_reference.problems import of_case
 from fem_reference.report.words import duration

@@ -13,7 +13,8 @@ from fem_reference.problems.body import Prescribed
 from fem_reference.problems.paths import Affine, Rest
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import BodySettings
-from tests.solvers.fenicsx.test_body import ALL, box, session, settings, turned  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.conftest import session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_body import ALL, box, settings, turned
 
 pytestmark = pytest.mark.slow
 

@@ -23,12 +23,11 @@ from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, Pres
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.known import Known, KnownState
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolver
 from fem_reference.solvers.fenicsx.multigrid import Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
-from fem_reference.solvers.fenicsx.path import Path, settle
+from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
 from fem_reference.solvers.fenicsx.reference_cells import Displacement
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -121,10 +120,38 @@ class AssembledBody:
         if found.converged and (trouble := first_trouble(self.checks, before)) is not None:
             found = found.refused(trouble)
         if found.converged:
-            settle(self, before, frame)
+            self._settle(before, frame)
         else:
             self.go_back(before)
         return found
+
+    def _settle(self, before: Floats, frame: float) -> None:
+        """Take the present state as that of ``frame``. ``before`` (n,) are the unknowns at the start of its step, from which a
+        halfway state is solved where work and energy disagree.
+        """
+        after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
+        looked = False
+
+        def halfway() -> bool:
+            nonlocal looked
+            looked = True
+            self.go_back(before)
+            self.set_frame(middle)
+            found = self.newton.solve_among(self.contact, middle)
+            self.newton.thrown += found.iterations
+            return found.converged and self.determinants.smallest().value > 0
+
+        looks = self.judged and self.conserves and not self.clock.matters
+        self.path.settle(self.energy(), halfway if looks else None)
+        if looked:
+            self.set_frame(frame)
+            self.system.contact = contact
+            if self.contact:
+                self.contact.update(frame)
+        if self.contact:
+            self.contact.settle()
+        self.clock.settle(frame, after)
+        self.at = frame
 
     def go_back(self, before: Floats) -> None:
         """Restore the last good state, whose unknowns are ``before``."""

@@ -116,10 +116,8 @@ class ContactForces:
         ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.bones, self.now, strict=True):
             step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
-            points, displacement = (
-                self._places(self.moved, one.pressed),
-                carried.shares[one.pressed] @ moves[carried.dofs],
-            )
+            points = self._places(self.moved, one.pressed)
+            displacement = carried.shares[one.pressed] @ moves[carried.dofs]
             ahead.append(np.einsum("nij,nj->ni", one.slope, displacement - (apply(step, points) - points)))
         return which, found + np.concatenate(ahead)
 
@@ -159,14 +157,15 @@ class ContactForces:
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
             overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
-        found = {
-            "contact_depth": comm.allreduce(depth, MPI.MAX),
-            "contact_pressure": comm.allreduce(pressure, MPI.MAX),
-            "contact_area": comm.allreduce(float(self.points.areas[touched].sum()), MPI.SUM),
-            "contact_points": comm.allreduce(float(touched.sum()), MPI.SUM),
-            "contact_points_near": comm.allreduce(float(sum(len(one.near) for one in self.now)), MPI.SUM),
+        greatest = {"contact_depth": depth, "contact_pressure": pressure}
+        greatest |= {"overlap_at_rest": max(overlap, 0.0)} if self.law.relaxed else {}
+        sums = {
+            "contact_area": float(self.points.areas[touched].sum()),
+            "contact_points": float(touched.sum()),
+            "contact_points_near": float(sum(len(one.near) for one in self.now)),
         }
-        return found | ({"overlap_at_rest": comm.allreduce(max(overlap, 0.0), MPI.MAX)} if self.law.relaxed else {})
+        found = {name: comm.allreduce(value, MPI.MAX) for name, value in greatest.items()}
+        return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
     def deepest(self) -> str:
         """The depth of the deepest point, the bone that it is in, and its place."""
@@ -190,32 +189,29 @@ class ContactForces:
     def trouble(self, _: Floats, /) -> Trouble | None:
         """Diverged where a point went through a bone since the last settled state, or is pressed near the middle of one."""
         with self.spent.on("contact"):
-            why = self.tunnelled() or self.yielded()
+            through = [one for i in range(len(self.bones)) if (one := self._through(i))]
+            why = self._worst(through) or self._worst(self._yielded())
         return Trouble("diverged", why) if why else None
 
-    def yielded(self) -> str | None:
-        """The bone near whose middle a point is pressed, from where it could leave on any side; None without."""
+    def _yielded(self) -> list[tuple[float, str]]:
+        """The bones near whose middle a point is pressed, from where it could leave on any side, by how near."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
             half = entry.shape.half_thickness
             said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
-        return self._worst(mine)
-
-    def tunnelled(self) -> str | None:
-        """The point that went through a bone since the last settled state; None without. On its straight path through the bone's
-        frame it was inside, deeper than at both ends, and it left on the other side.
-        """
-        mine = [one for i in range(len(self.bones)) if (one := self._through(i))]
-        return self._worst(mine)
+        return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the greatest number, over all ranks; None without."""
+        """The sentence with the greatest number, over all ranks; None where there is none."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
+        """The point that went farthest through a bone since the last settled state; None where none did. On its straight path
+        through the bone's frame it was inside, deeper than at both ends, and it left on the other side.
+        """
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
         met, starts, ends = self.nearby[i].crossing(there, here)

@@ -39,7 +39,8 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
     count = topology.index_map(0).size_local + topology.index_map(0).num_ghosts
     nodes = mesh.entities_to_geometry(msh, 0, np.arange(count, dtype=np.int32))[:, 0]
     points = np.asarray(msh.geometry.input_global_indices)[nodes]
-    corners = vertices.array.reshape(vertices.num_nodes, -1)[exterior]
+    size = len(vertices.array) // max(1, vertices.num_nodes)  # corners of a facet; a rank may have none
+    corners = vertices.array.reshape(-1, max(1, size))[exterior]
     original = list(map(tuple, np.sort(points[corners], axis=1).tolist()))
     wanted = (set(map(tuple, np.sort(region, axis=1).tolist())) for region in regions)
     return [exterior[np.array([corners in region for corners in original], bool)] for region in wanted]

@@ -6,6 +6,8 @@ Pressure block: the mass matrix over local stiffness, which is spectrally equiva
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
+from weakref import proxy
+
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem.petsc import interpolation_matrix
@@ -34,10 +36,9 @@ class Multigrid:
         self.number = np.zeros(system.size, np.int64)  # of an unknown in its block
         self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
         self.coarse, self.fixed = self._interpolation(displaced.astype(np.int64))
-        self.blocks = _Blocks(self.sets)
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.getPC().setType("python")
-        self.krylov.getPC().setPythonContext(self.blocks)
+        self.krylov.getPC().setPythonContext(proxy(self))  # which owns it
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
@@ -63,10 +64,24 @@ class Multigrid:
     def _renew(self) -> None:
         """Build the preconditioner of the present matrix."""
         with self.spent.on("factorisation"):
-            stiff, coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
-            self.blocks.renew(stiff, coupling, self._cycle(stiff), self._mass())
+            stiff, self.coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
+            self.cycle, self.mass = self._cycle(stiff), self._mass()
         self.spent.counts["factorisations"] += 1
         self.stale = False
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
+        forces, volumes = (x.getSubVector(names) for names in self.sets)
+        moves, pressures = (y.getSubVector(names) for names in self.sets)
+        self.mass.apply(volumes, pressures)
+        pressures.scale(-1.0)
+        remaining = forces.duplicate()
+        self.coupling.mult(pressures, remaining)
+        remaining.aypx(-1.0, forces)
+        self.cycle.apply(remaining, moves)
+        for names, given, found in zip(self.sets, (forces, volumes), (moves, pressures), strict=True):
+            x.restoreSubVector(names, given)
+            y.restoreSubVector(names, found)
 
     def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
         """One cycle between the two elements."""
@@ -126,30 +141,3 @@ class Multigrid:
         found.sum_duplicates()
         csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
         return PETSc.Mat().createAIJ(found.shape, csr=csr, comm=self.matrix.comm)
-
-
-class _Blocks:
-    """The block triangular preconditioner as PETSc applies it."""
-
-    def __init__(self, sets: list[PETSc.IS]) -> None:
-        self.sets = sets
-
-    def renew(self, stiff: PETSc.Mat, coupling: PETSc.Mat, cycle: PETSc.PC, mass: PETSc.PC) -> None:
-        """Replace the blocks: those of the tangent, and the solvers for displacement and pressure."""
-        self.coupling, self.cycle, self.mass = coupling, cycle, mass
-        self.displaced, self.moved = stiff.createVecRight(), stiff.createVecRight()
-        self.pressed = coupling.createVecRight()
-
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
-        forces, volumes = x.getSubVector(self.sets[0]), x.getSubVector(self.sets[1])
-        self.mass.apply(volumes, self.pressed)
-        self.pressed.scale(-1.0)
-        self.coupling.mult(self.pressed, self.displaced)
-        self.displaced.aypx(-1.0, forces)
-        self.cycle.apply(self.displaced, self.moved)
-        for names, part, found in zip(self.sets, (forces, volumes), (self.moved, self.pressed), strict=True):
-            x.restoreSubVector(names, part)
-            into = y.getSubVector(names)
-            found.copy(into)
-            y.restoreSubVector(names, into)

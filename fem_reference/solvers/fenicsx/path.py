@@ -1,7 +1,7 @@
-"""Signs of a jump between successive states of a body; no other solution is needed."""
+"""States of a body: signs of a jump between successive ones, and earlier ones that are used again."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -12,9 +12,6 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
-if TYPE_CHECKING:
-    from fem_reference.solvers.fenicsx.body import AssembledBody
-
 # On the straight line from one state to the next, det F, a cubic of the share of the line, keeps this share of the
 # lesser end value. A turn by 143 degrees within a step reduces it to a tenth; half a turn, or a mirrored state on the
 # line, to 0 or below.
@@ -22,9 +19,14 @@ KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
 
+# Loads and boundary conditions are the same if none differs by more (mm, and entries of a pose): rounding of a returning motion.
+_SAME = 1e-9
+# States are kept up to this memory [bytes] on each rank, the latest ones.
+_MOST = 512e6
+
 
 class Path:
-    """The successive states of a ``system``. Its methods are collective."""
+    """Watches the successive states of a ``system`` for jumps, without any other solution. Its methods are collective."""
 
     def __init__(self, system: System, determinants: Determinants) -> None:
         self.system, self.determinants = system, determinants
@@ -93,33 +95,6 @@ class Path:
         return gap
 
 
-def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
-    """Take the present state of a ``body`` as that of ``frame``. ``before`` (n,) are the unknowns at the start of its step, from
-    which a halfway state is solved where work and energy disagree.
-    """
-    after, contact, looked = np.array(body.unknowns.x.array), body.system.contact, list[float]()
-
-    def halfway() -> bool:
-        looked.append((body.at + frame) / 2)
-        body.go_back(before)
-        body.set_frame(looked[0])
-        found = body.newton.solve_among(body.contact, looked[0])
-        body.newton.thrown += found.iterations
-        return found.converged and body.determinants.smallest().value > 0
-
-    looks = body.judged and body.conserves and not body.clock.matters
-    body.path.settle(body.energy(), halfway if looks else None)
-    if looked:
-        body.set_frame(frame)
-        body.system.contact = contact
-        if body.contact:
-            body.contact.update(frame)
-    if body.contact:
-        body.contact.settle()
-    body.clock.settle(frame, after)
-    body.at = frame
-
-
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
     """Forces, and the displacements along which they work: straight lines between two ``states``, or parabolas over time through
     three. Along these the integral is that of Simpson's rule, which is exact for them.
@@ -149,3 +124,32 @@ def least(values: Floats) -> Floats:
         share = np.where(inside, turn, 0.0)
         found = np.minimum(found, ((coefficients[0] * share + b) * share + c) * share + coefficients[3])
     return np.asarray(found)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownState:
+    """``unknowns`` (n,) in equilibrium under ``acting`` (m,), all numbers that determine it, and its ``negative_modes``."""
+
+    acting: Floats
+    unknowns: Floats
+    negative_modes: float | None
+
+
+class Known:
+    """The states of a run so far, the same on all ranks of ``comm``."""
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self.comm = comm
+        self.states: list[KnownState] = []
+
+    def add(self, state: KnownState) -> None:
+        """Keep a state; it is in equilibrium."""
+        self.states.append(state)
+        size = self.comm.allreduce(state.unknowns.nbytes + state.acting.nbytes, MPI.MAX)
+        del self.states[: max(0, len(self.states) - max(1, int(_MOST / size)))]
+
+    def find(self, acting: Floats) -> KnownState | None:
+        """The state under ``acting``, None where there is none."""
+        same = np.array([np.abs(one.acting - acting).max(initial=0.0) <= _SAME for one in self.states], bool)
+        self.comm.Allreduce(MPI.IN_PLACE, same, MPI.LAND)
+        return self.states[int(np.argmax(same))] if same.any() else None

@@ -1,6 +1,5 @@
 """The reference solves bodies: what it refuses, springs, balance, the order of nodes, and processes that die."""
 
-import importlib.util
 import itertools
 from dataclasses import replace
 
@@ -23,14 +22,6 @@ pytestmark = pytest.mark.slow
 ALL = (0, 1, 2)
 ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
 BOTH = pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
-
-
-@pytest.fixture(scope="module")
-def session():
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        pytest.skip("FEniCSx is not installed")
-    with fenicsx.session() as opened:
-        yield opened
 
 
 def effect(name: str, **parameters) -> Effect:

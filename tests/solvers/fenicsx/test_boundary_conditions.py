@@ -6,13 +6,13 @@ import pytest
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
-from tests.solvers.fenicsx.test_body import BOTH, FLESH, ONCE, box, effect, session, settings  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_body import BOTH, FLESH, ONCE, box, effect, settings
 
 pytestmark = pytest.mark.slow
 
 
 @BOTH
-def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:  # noqa: F811
+def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:
     stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
     acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
@@ -26,7 +26,7 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
 
 
 @pytest.mark.parametrize("element", ["P2/P1", "P2/P0"])
-def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:  # noqa: F811
+def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
     # Points 0.05 mm below the face that springs attach, of uneven areas; the pull is off their middle: the block turns on them.
     stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
     acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", ramp=ONCE))
@@ -47,7 +47,7 @@ def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element
 
 
 @BOTH
-def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:  # noqa: F811
+def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:
     stretch, forces = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.2)), []
     fixed = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
     for stiffness in (None, 1e2, 1e3):

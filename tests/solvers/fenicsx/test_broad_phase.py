@@ -60,7 +60,7 @@ def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, 
         forces.update(frame)
         count, residual = sum(looked), np.zeros(3 * 13**2)
         forces.add_residual(residual, None)
-        found.append((residual.tolist(), forces.tunnelled(), count))
+        found.append((residual.tolist(), forces.trouble(np.zeros(0)), count))
         forces.settle()
     return found
 
@@ -103,5 +103,5 @@ def test_what_stays_out_of_reach_is_not_looked_at(monkeypatch) -> None:
         forces.update(0.0)
         forces.add_residual(np.zeros(3 * 13**2), None)
         assert list(forces.tangent()) == []
-        assert forces.tunnelled() is None
+        assert forces.trouble(np.zeros(0)) is None
         forces.settle()

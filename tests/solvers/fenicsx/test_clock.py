@@ -12,7 +12,7 @@ from fem_reference.problems.paths import Affine
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from tests.solvers.fenicsx.test_damping import DRAG
-from tests.solvers.fenicsx.test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import effect, flesh
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +31,7 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
     check(replace(body, interval=0.1), "P2/P1")
 
 
-def test_a_step_that_fails_leaves_the_clock_alone(session) -> None:  # noqa: F811
+def test_a_step_that_fails_leaves_the_clock_alone(session) -> None:
     # One Newton iteration is not enough for the whole step: it is cut, and the block falls as far as its drag allows.
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     ramp = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]

@@ -12,7 +12,7 @@ from fem_reference.problems.paths import Affine, Rest
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import ScikitBodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
-from tests.solvers.fenicsx.test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,7 @@ def stretched(acting, interval: float | None = None, speed: float = 1.0) -> Body
     return Body(mesh, acting, fixed, (0.0, 1 / speed, 1 / speed + 40), interval=interval)
 
 
-def test_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:
     # A drag of 1e-6 MPa s/mm2 over 1 mm2 against a stiffness of 0.01 MPa: it has settled in a ten-thousandth of a frame of 1 s.
     settings = BodySettings(first_step=0.5, residual=1e-12)
     without, slow = (
@@ -48,7 +48,7 @@ def test_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:
     assert slow.forces["z1"] == pytest.approx(without.forces["z1"], abs=1e-9)
 
 
-def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
+def test_speed_costs_force_but_stores_nothing(session) -> None:
     # The mean speed of the block is half that of its end, 0.5 mm a frame of 1 ms: its drag has to be limited by both ends.
     settings = BodySettings(first_step=100.0, residual=1e-12)
     fast, still = (
@@ -64,7 +64,7 @@ def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
 
 
 @pytest.fixture(scope="module")
-def leaning(session):  # noqa: F811
+def leaning(session):
     """The states of a column at 1.4 of Euler's shortening for 40 frames of 1 s; the diagonals of its tets bend it."""
     body = column("P2/P1", (1, 1, 20), [1.4 * critical(THIN)])
     drag = effect("damping", coefficient="0.5 Pa s/mm^2")
@@ -98,7 +98,7 @@ def test_it_leaves_as_fast_as_its_drag_allows(leaning) -> None:
     assert 1 - steps[:-1] / steps[1:] == pytest.approx(rate, rel=0.1)
 
 
-def test_a_step_that_is_too_long_stays_in_the_unstable_state_and_reports_it(leaning, session) -> None:  # noqa: F811
+def test_a_step_that_is_too_long_stays_in_the_unstable_state_and_reports_it(leaning, session) -> None:
     # The bend grows by a factor e in 2.5 s.
     body, _ = leaning
     solved = session.solve(replace(body, frames=(0.0, 1.0, 40.0)), BodySettings(first_step=100.0, residual=1e-11))

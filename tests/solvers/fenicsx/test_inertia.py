@@ -21,7 +21,7 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.key import PACKAGE
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.verification.contact import Slide
-from tests.solvers.fenicsx.test_stability import flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import flesh
 
 # The rule
 
@@ -75,7 +75,7 @@ def dropped(acting: tuple[Effect, ...]) -> Body:
 
 
 @pytest.mark.slow
-def test_a_bounce_makes_no_energy(session) -> None:  # noqa: F811
+def test_a_bounce_makes_no_energy(session) -> None:
     settings = BodySettings(first_step=1.0, largest_step=1.0)
     found = session.solve(dropped((made("inertia", density=1e-9),)), settings)
     states = found.states

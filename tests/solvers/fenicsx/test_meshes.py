@@ -5,13 +5,13 @@ import pytest
 
 from fem_reference.problems.body import Cells
 from fem_reference.problems.paths import Turn
-from tests.solvers.fenicsx.test_body import BOTH, box, session, settings, turned  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_body import BOTH, box, settings, turned
 
 pytestmark = pytest.mark.slow
 
 
 @BOTH
-def test_the_order_of_nodes_and_cells_does_not_matter(element, session) -> None:  # noqa: F811
+def test_the_order_of_nodes_and_cells_does_not_matter(element, session) -> None:
     mesh, random = box(element, (1, 2, 2)), np.random.default_rng(4)
     new = random.permutation(len(mesh.points))  # where each node goes
     points = np.empty_like(mesh.points)

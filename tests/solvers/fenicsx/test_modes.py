@@ -14,7 +14,7 @@ from fem_reference.problems.paths import Affine, Rest
 from fem_reference.solvers.fenicsx import BodySettings, modes
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.verification import parts
-from tests.solvers.fenicsx.test_stability import THIN, column, critical, flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import THIN, column, critical
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:(cmap|dofmap) is deprecated")]
 
@@ -44,7 +44,7 @@ def test_a_limit_point_is_claimed_within_four_of_the_smallest_steps_only() -> No
     assert modes.ahead(built, left / 5) is None
 
 
-def test_a_column_leaves_the_straight_state_where_it_is_unstable(session) -> None:  # noqa: F811
+def test_a_column_leaves_the_straight_state_where_it_is_unstable(session) -> None:
     body = column("Q2/Q1", (1, 1, 10), [0.97 * critical(THIN), 1.1 * critical(THIN)])
     straight, bent = (
         session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0, follow=follow))

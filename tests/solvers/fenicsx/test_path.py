@@ -1,11 +1,14 @@
-"""States that do not belong to one path are not taken, and an unstable equilibrium is left where that is wanted."""
+"""States that do not belong to one path are not taken; those under the same loads are taken up again, as far as memory goes."""
 
-import importlib
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
+
+from mpi4py import MPI
 
 from fem_reference import effects
 from fem_reference.foundations import limits
@@ -13,9 +16,9 @@ from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Follows, Rest, Turn
-from fem_reference.solvers.fenicsx import BodySettings
+from fem_reference.solvers.fenicsx import BodySettings, path
 from fem_reference.studies import workflow
-from tests.solvers.fenicsx.test_stability import THIN, column, critical, flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import flesh
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +32,7 @@ def twisted(angle: float, frames: tuple[float, ...]) -> Body:
 
 
 @pytest.mark.parametrize("frames", [(0.0, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)])
-def test_a_bar_that_is_twisted_by_a_whole_turn_is_not_at_rest(frames, session) -> None:  # noqa: F811
+def test_a_bar_that_is_twisted_by_a_whole_turn_is_not_at_rest(frames, session) -> None:
     """All that is prescribed is as at rest, which one step, or the state of before, would take for the answer."""
     solved = session.solve(twisted(2 * np.pi, frames), BodySettings(element="Q2/Q1", first_step=1.0))
     half = session.solve(twisted(np.pi, (0.0, 0.5, 1.0)), BodySettings(element="Q2/Q1", first_step=0.5))
@@ -57,7 +60,7 @@ def knotted(*knots: tuple[float, float]) -> Follows:
         (WHIRLED, 20.0, 20.0),
     ],
 )
-def test_a_whole_turn_within_a_load_step_is_not_left_out(head, last, step, session) -> None:  # noqa: F811
+def test_a_whole_turn_within_a_load_step_is_not_left_out(head, last, step, session) -> None:
     """Whichever load steps lead there, the end is that of a turn by quarters, or the other state into which the bar buckles under
     a whole turn: they store 0.01126 and 0.01120 N mm, and one that is not twisted nothing.
     """
@@ -71,7 +74,7 @@ def test_a_whole_turn_within_a_load_step_is_not_left_out(head, last, step, sessi
     assert quarters.last.scalars["energy"] > 0.01
 
 
-def test_drag_feels_a_way_there_and_back_within_a_load_step(session) -> None:  # noqa: F811
+def test_drag_feels_a_way_there_and_back_within_a_load_step(session) -> None:
     """A bar that is moved there and back within one step of its own is behind afterwards."""
     slide = Follows(Translation((1, 0, 0), (0.0, 0.4, 0.8), (0.0, 1.0, 0.0)).pose)
     acting = (*flesh("Q2/Q1"), effects.make("damping", coefficient=1e-3))
@@ -84,7 +87,7 @@ def test_drag_feels_a_way_there_and_back_within_a_load_step(session) -> None:  #
 
 
 @pytest.mark.parametrize("element", ["P2/P1", "P1/P1"])
-def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) -> None:  # noqa: F811
+def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) -> None:
     """By the trapezoidal rule, whose error of a step falls with its cube and the energy with its square; where pressures are
     stabilised too, whose energy is a part of it.
     """
@@ -114,20 +117,18 @@ class Springs:
 
 def gap(energy, slope, states: list[list[float]], *, looked: bool = True) -> float:
     """The energy gap of a step from the first of ``states`` to the last, that in between being the one halfway."""
-    pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", exc_type=ImportError)
-    path_module = importlib.import_module("fem_reference.solvers.fenicsx.path")
     system = Springs(slope, states[0])
-    path = path_module.Path(system, None)
-    path.settle(energy(*states[0]), connected=False)
+    followed = path.Path(system, None)
+    followed.settle(energy(*states[0]), connected=False)
 
     def halfway() -> bool:
         system.unknowns.x.array[:] = states[1]
         return True
 
     system.unknowns.x.array[:] = states[2]
-    path.settle(energy(*states[2]), halfway if looked else None)
+    followed.settle(energy(*states[2]), halfway if looked else None)
     assert system.unknowns.x.array.tolist() == states[2]
-    return path.take_gap()
+    return followed.take_gap()
 
 
 def test_a_spring_that_stiffens_loses_no_energy_in_its_first_step() -> None:
@@ -177,3 +178,28 @@ def test_the_main_job_loses_no_energy_in_its_first_step(tmp_path) -> None:
     # Both end where forces are in balance to 1e-8 N.
     np.testing.assert_allclose(*(run.scalars["energy"] for run in runs), rtol=1e-7)
     np.testing.assert_allclose(*(run.positions for run in runs), atol=1e-5)
+
+
+def state(*acting: float) -> path.KnownState:
+    return path.KnownState(np.array(acting), np.zeros(3), None)
+
+
+def test_a_state_is_known_where_nothing_that_acts_differs_by_more_than_rounding() -> None:
+    states = path.Known(MPI.COMM_SELF)
+    assert states.find(np.array([0.0, 1.0])) is None
+    here, there = state(0.0, 1.0), state(0.0, 2.0)
+    states.add(here)
+    states.add(there)
+    assert states.find(np.array([1e-10, 1.0])) is here
+    assert states.find(np.array([0.0, 2.0])) is there
+    assert states.find(np.array([1e-6, 1.0])) is None  # a nanometre is another load
+    assert states.find(np.array([0.0, 1.5])) is None
+
+
+def test_the_latest_states_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(path, "_MOST", 2 * (3 + 1) * 8.0)  # bytes, two states of four numbers
+    states = path.Known(MPI.COMM_SELF)
+    for i in range(3):
+        states.add(state(float(i)))
+    assert states.find(np.array([0.0])) is None
+    assert [states.find(np.array([float(i)])) is not None for i in (1, 2)] == [True, True]

@@ -17,18 +17,18 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import FieldSettings
 from fem_reference.solvers.fenicsx.processes import installed
 from fem_reference.solvers.fenicsx.session import Session
-from tests.solvers.fenicsx.test_body import FLESH, box, session, settings, turned  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_body import FLESH, box, settings, turned
 
 pytestmark = pytest.mark.slow
 fenicsx_only = pytest.mark.skipif(not installed(), reason="FEniCSx is not installed")
 
 
-def test_a_session_checks_the_element(session) -> None:  # noqa: F811
+def test_a_session_checks_the_element(session) -> None:
     with pytest.raises(InputError, match="want one for tetrahedron cells"):
         session.solve(Body(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
 
 
-def test_a_session_outlives_its_process(session) -> None:  # noqa: F811
+def test_a_session_outlives_its_process(session) -> None:
     body = turned(box("Q1/P0"), Turn((0.0, 0.0, 1.0), 0.3))
     before = session.solve(body, settings("Q1/P0")).last
     session.process.process.kill()
@@ -40,7 +40,7 @@ def test_a_session_outlives_its_process(session) -> None:  # noqa: F811
     assert session.solve(body, settings("Q1/P0")).last.points == pytest.approx(before.points, abs=1e-12)
 
 
-def test_a_process_that_fails_says_why(session) -> None:  # noqa: F811
+def test_a_process_that_fails_says_why(session) -> None:
     body = turned(box("Q1/P0"), Rest())
     here = os.getpid()  # elsewhere it divides by zero
     wrong = Prescribed("x0", "x0", (0,), lambda points, _: 0 * points * (1 // int(os.getpid() == here)))
@@ -50,7 +50,7 @@ def test_a_process_that_fails_says_why(session) -> None:  # noqa: F811
     assert session.solve(body, settings("Q1/P0")).outcome.status == "converged"
 
 
-def test_a_closed_session_raises(session) -> None:  # noqa: F811, ARG001 - it skips where there is no FEniCSx
+def test_a_closed_session_raises(session) -> None:  # noqa: ARG001 - it skips without FEniCSx
     with fenicsx.session() as short:
         pass
     with pytest.raises(RuntimeError, match="the session is closed"):
@@ -63,7 +63,7 @@ def test_without_fenicsx_there_is_no_session(monkeypatch) -> None:
         pass
 
 
-def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noqa: F811, ARG001 - it skips without FEniCSx
+def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noqa: ARG001 - it skips without FEniCSx
     body = turned(box("Q1/P0"), Rest())
     with fenicsx.session() as fresh:
         # To start the process alone takes longer.

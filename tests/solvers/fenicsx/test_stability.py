@@ -1,6 +1,5 @@
 """How many negative modes a state has: columns that buckle when they should, blocks that do not, and when nobody can say."""
 
-import importlib.util
 from dataclasses import replace
 
 import numpy as np
@@ -25,14 +24,6 @@ pytestmark = pytest.mark.slow
 
 STILL = ((0.0, 0.0, 0.0),) * 3
 THIN, WIDE, LENGTH = 1.0, 1.3, 20.0  # mm
-
-
-@pytest.fixture(scope="module")
-def session():
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        pytest.skip("FEniCSx is not installed")
-    with fenicsx.session() as opened:
-        yield opened
 
 
 def effect(name: str, **parameters) -> Effect:

@@ -15,7 +15,7 @@ from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.verification import parts
-from tests.solvers.fenicsx.test_body import ALL, BOTH, FLESH, box, session, settings, turned  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_body import ALL, BOTH, FLESH, box, settings, turned
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:(cmap|dofmap) is deprecated")]
 
@@ -67,7 +67,7 @@ def test_what_is_prescribed_is_left_out_and_missed_where_it_is_not_there(body) -
 
 
 @BOTH
-def test_forces_and_moments_of_a_turned_bar_are_in_balance(element, session) -> None:  # noqa: F811
+def test_forces_and_moments_of_a_turned_bar_are_in_balance(element, session) -> None:
     turn = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
     state = session.solve(turned(box(element, (2, 2, 4), (1.0, 1.0, 2.0)), turn), settings(element)).last
     assert np.linalg.norm(state.forces["top"]) > 1e-4
@@ -77,7 +77,7 @@ def test_forces_and_moments_of_a_turned_bar_are_in_balance(element, session) -> 
     assert sum(state.moments.values()) == pytest.approx(np.zeros(3), abs=1e-11)
 
 
-def test_what_attachments_share_counts_once(session) -> None:  # noqa: F811
+def test_what_attachments_share_counts_once(session) -> None:
     # Two regions meet in an edge and both prescribe it. Of a muscle, which has points to be followed, all forces are in balance.
     fixed = (
         Prescribed("bottom", "z0", ALL, Rest()),

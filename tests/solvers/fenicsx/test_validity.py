@@ -1,6 +1,5 @@
 """Laws outside the range that they are meant for, and bodies that collapse: nothing of it passes in silence."""
 
-import importlib.util
 from dataclasses import replace
 
 import numpy as np
@@ -28,14 +27,6 @@ pytestmark = pytest.mark.slow
 
 ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
 COLLAPSED = 0.2  # V/V0 of a cell
-
-
-@pytest.fixture(scope="module")
-def session():
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        pytest.skip("FEniCSx is not installed")
-    with fenicsx.session() as opened:
-        yield opened
 
 
 def effect(name: str, **parameters) -> Effect:

@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import ScikitBodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
 from fem_reference.verification.parts import SYMMETRY
-from tests.solvers.fenicsx.test_stability import STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
+from tests.solvers.fenicsx.test_stability import STILL, THIN, column, critical, effect, flesh
 
 pytestmark = pytest.mark.slow
 
@@ -105,7 +105,7 @@ def pulled(acting, interval: float | None = None) -> Body:
     return Body(mesh, acting, fixed, (0.0, 1.0, 41.0), interval=interval)
 
 
-def test_speed_costs_force_and_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_speed_costs_force_and_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:
     settings = BodySettings(first_step=1.0, residual=1e-12)
     still, thick = (
         session.solve(body, settings)
@@ -121,7 +121,7 @@ def test_speed_costs_force_and_what_is_fixed_long_enough_ends_where_it_would_wit
     assert thick.last.forces["z1"] == pytest.approx(still.last.forces["z1"], abs=1e-9)
 
 
-def test_turning_costs_nothing_however_fast(session) -> None:  # noqa: F811
+def test_turning_costs_nothing_however_fast(session) -> None:
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     turn = Turn((1.0, 2.0, 3.0), 1.0)
     fixed = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
@@ -132,7 +132,7 @@ def test_turning_costs_nothing_however_fast(session) -> None:  # noqa: F811
         assert force == pytest.approx(np.zeros(3), abs=1e-9)  # a viscous stress would be of the order of 20 MPa
 
 
-def test_negative_modes_are_those_that_grow_within_all_frames(session) -> None:  # noqa: F811
+def test_negative_modes_are_those_that_grow_within_all_frames(session) -> None:
     # A bent column loses E I k^2 a^2 of the energy of its bend and pays 3 eta I k^2 k^2 a'^2: the bend grows at mu / eta times
     # (P - P_c) / P_c, here 0.4 mu / eta, whatever its shape; in 8 s by a factor e where eta is 3.2 s mu. These tets are stiffer by
     # up to 5 per cent, an eighth of 0.4.
