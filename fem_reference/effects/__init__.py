@@ -26,7 +26,7 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.material_point import State as State
 from fem_reference.foundations.records import Record, parse
-from fem_reference.foundations.units import unit_of, written
+from fem_reference.foundations.units import PositivePressure, unit_of, written
 
 __path__ += outside.folders()
 
@@ -123,6 +123,21 @@ class Energy(Effect):
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
 
+class VolumeLaw(Energy):
+    """An energy of the volume alone, of the bulk modulus ``bulk`` [MPa], whose range is V/V0 from 1/2 to 2."""
+
+    example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
+    bulk: PositivePressure
+
+    def limits(self) -> tuple[Limit, ...]:
+        """The range of the volume."""
+        return (Limit("V/V0", 0.5, 2.0),)
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(bulk=self.bulk)
+
+
 class Load(Effect):
     """A load on the part ``on`` of the surface."""
 
@@ -170,6 +185,18 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
 
 
+def passive_tension(effect: Energy, scene: Estimates) -> Indicator:
+    """The tension of passive fibres at the greatest expected stretch, against the matrix."""
+    greatest = scene.stretch[1]
+    pull = fibre_tension(effect, greatest)
+    return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
+
+
+def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
+    """The indicator of fibres that ``pull`` [MPa] at the muscle, by which its surface moves by a ``distance`` [mm]."""
+    return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
+
+
 def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
     """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of the energy."""
 
@@ -210,7 +237,7 @@ class FieldEffect(Record):
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
         """The term times ``test``, integrated by parts where it has second derivatives; linear in ``test``, affine in ``psi``."""
-        raise NotImplementedError(f"{type(self).__name__} has no weak form")
+        return self.strong(psi, place) * test.value
 
     def strong(self, psi: FieldState, place: Place) -> Any:
         """The term itself, as a residual-based stabilisation needs it."""

@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, Ramped, State
+from fem_reference.effects import Energy, Ramped, State, fibre_indicator
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PositivePressure
 
@@ -21,9 +21,7 @@ class ActiveTension(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The distance by which active fibres straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.tension
-        return Indicator(
-            "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull
-        )
+        return fibre_indicator(scene, pull, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

@@ -14,10 +14,6 @@ class Advection(FieldEffect):
     example: ClassVar[dict[str, Any]] = {"velocity": [1.0, -3.0]}
     velocity: tuple[float, ...]
 
-    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
-        """``(v . grad psi) test``."""
-        return self.strong(psi, place) * test.value
-
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
         """``v . grad psi``."""
         return self.along(psi)

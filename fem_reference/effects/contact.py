@@ -14,8 +14,8 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 class Contact(Interaction):
     """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
 
-    ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets at most p / stiffness deep. ``smoothing`` [mm]: from
-    this distance on a bone is felt. ``bones``: their names, by default all.
+    ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
+    distance below which a bone is felt. ``bones``: their names, by default all.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}
@@ -31,7 +31,7 @@ class Contact(Interaction):
         reached = "; ".join(
             f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing
         )
-        rule = f"gap to bones that is free for certain [mm] ({reached or 'no bone is reached'})"
+        rule = f"guaranteed clearance to bones [mm] ({reached or 'no bone is reached'})"
         return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:

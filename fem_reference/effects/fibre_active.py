@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, Ramped, State
+from fem_reference.effects import Energy, Ramped, State, fibre_indicator
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
@@ -17,7 +17,7 @@ class FibreActive(Ramped, Energy):
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
-    Meant for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
+    Valid for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -32,9 +32,7 @@ class FibreActive(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The distance by which active fibres straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.stress
-        return Indicator(
-            "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull
-        )
+        return fibre_indicator(scene, pull, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

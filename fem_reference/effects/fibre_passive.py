@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, Moduli, State, fibre_tension
+from fem_reference.effects import Energy, Moduli, State, passive_tension
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
@@ -18,7 +18,7 @@ class FibrePassive(Energy):
     fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
 
-    Meant for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
+    Valid for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
     data of longer fibres stands behind this law. Slack fibres are without limit.
     """
 
@@ -42,13 +42,7 @@ class FibrePassive(Energy):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        pull = fibre_tension(self, scene.stretch[1])
-        return Indicator(
-            "tension of the fibres over the shear modulus",
-            pull / scene.shear,
-            scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
-            pull,
-        )
+        return passive_tension(self, scene)
 
     def moduli(self) -> Moduli:
         """The stiffness that it gives the body at rest."""

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fem_reference.effects import Energy, State, fibre_tension
+from fem_reference.effects import Energy, State, passive_tension
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PositivePressure
 
@@ -32,13 +32,7 @@ class FibrePassiveFebio(Energy):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        pull = fibre_tension(self, scene.stretch[1])
-        return Indicator(
-            "tension of the fibres over the shear modulus",
-            pull / scene.shear,
-            scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
-            pull,
-        )
+        return passive_tension(self, scene)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

@@ -2,33 +2,21 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, Moduli, State
-from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.units import PositivePressure
+from fem_reference.effects import State, VolumeLaw
 
 
-class Incompressible(Energy):
+class Incompressible(VolumeLaw):
     """``p (J - 1) - p^2 / (2 K)``: the perturbed Lagrangian whose stationary point in p is ``p = K (J - 1)``.
 
     ``bulk``: bulk modulus K [MPa]. Source: Sussman and Bathe 1987, doi 10.1016/0045-7949(87)90265-3, with U = K/2 (J - 1)^2.
 
-    Meant for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` is steepest at 1/2: below it each shrinking
+    Valid for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` is steepest at 1/2: below it each shrinking
     by the same factor meets less resistance, and U stays below K/2 down to J = 0, so that isochoric energies can shrink a body to
     almost nothing (``verification/squeeze.py`` has an example). Above 1 the law has no such end; there 2 is as far from 1 as 1/2
     is, by the logarithm, and far beyond what water-filled tissue does.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)
-    example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
-    bulk: PositivePressure
-
-    def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
-        return (Limit("V/V0", 0.5, 2.0),)
-
-    def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
-        return Moduli(bulk=self.bulk)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

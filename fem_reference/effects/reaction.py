@@ -14,10 +14,6 @@ class Reaction(FieldEffect):
     example: ClassVar[dict[str, Any]] = {"rate": 0.5}
     rate: float
 
-    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
-        """``c psi test``."""
-        return self.strong(psi, place) * test.value
-
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
         """``c psi``."""
         return self.rate * psi.value

@@ -17,10 +17,6 @@ class Source(FieldEffect):
     strength: Formula
     where: Literal["everywhere", "y above average"]
 
-    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
-        """``-f test``."""
-        return self.strong(psi, place) * test.value
-
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
         """``-f``."""
         strength = evaluate(self.strength, place.position, place.functions)

@@ -1,16 +1,28 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles) as they compute, whatever equation the scene states."""
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles) as they compute, whatever the scene and the report state.
+
+Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
+listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: of the points of a
+mesh only the directions of its edges are felt. validation/octave has the listings as Octave runs them, their results, and the
+reading of each misprint.
+"""
 
 import time
+from typing import Any
 
 import numpy as np
 from pydantic import Field
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record, join
 from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers import listing_kernels
 from fem_reference.solvers.common.protocol import FieldSolver
+
+# Listing 4.5, line 18: the factors of A A, A and 1.
+SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
@@ -28,11 +40,11 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
     mesh = problem.mesh
     check(settings, problem, "listing")
     if mesh.cells.shape[1] == 2:
-        values, components = listing_kernels.fem1d(mesh.points[:, 0], settings.peclet or 1.0), None
+        values, components = fem1d(mesh.points[:, 0], settings.peclet or 1.0), None
     else:
         fixed = np.flatnonzero(~np.isnan(problem.fixed[: len(mesh.points)]))
         bounds = np.array([fixed, problem.fixed[fixed]])
-        norms, components = listing_kernels.fem2d(mesh.cells, mesh.points, bounds)
+        norms, components = fem2d(mesh.cells, mesh.points, bounds)
         values = 0.0 - norms
     if problem.order == 2:  # the listings are linear between vertices
         values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
@@ -61,6 +73,95 @@ def _check_ends(problem: FieldProblem, place: str) -> None:
     if not (fixed[0] == 0 and np.isnan(fixed[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
         want = "value 0 on the left and slope -1 on the right, as listing 4.1 has"
         raise InputError(join(place, "boundary"), "other conditions", want)
+
+
+def fem1d(nodes: Floats, peclet: float) -> Floats:
+    """Listing 4.1 at given increasing ``nodes`` (n,): the solution (n,), 0 at the first node and of slope -1 / peclet at the last.
+
+    ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``: it
+    solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1), for any nodes, at the nodes, without error:
+    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. Nothing in it is advection.
+    """
+    steps = np.diff(nodes)
+    if len(steps) == 0 or not (steps > 0).all():
+        raise InputError("nodes", "nodes that do not increase", "two or more, each beyond the one before")
+    if not peclet > 0:
+        raise InputError("peclet", peclet, "more than zero")
+    idel = peclet / steps
+    left, right = np.append(idel, 0), np.append(0, idel)
+    diff_op = sparse.diags_array([idel, -left - right, idel], offsets=[-1, 0, 1], format="csr")
+    right_side = np.append(0.5 / idel, 0) + np.append(0, 0.5 / idel)
+    right_side[-1] -= -1
+    diff_op, right_side = dirichlet(diff_op, right_side, 1, np.zeros((2, 1)))
+    return np.asarray(spsolve(diff_op.tocsc(), right_side))
+
+
+def first_derivative(triangles: Ints, points: Floats) -> Any:
+    """Listing 4.2: the sparse matrix A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim), dim by dim for each vertex.
+
+    For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and taken from the
+    two blocks between them. No derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
+    springs along the edges, all of one stiffness whatever their length, w = 2 inside and 1 at the rim.
+    """
+    dim = points.shape[1]
+    s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    d = points[s] - points[t]
+    lengths = np.linalg.norm(d, axis=1)
+    if not (lengths > 0).all():
+        edge = int(np.argmin(lengths > 0))
+        raise InputError(
+            "points", f"vertices {s[edge]} and {t[edge]} of one edge at one place", "edges with a direction"
+        )
+    d /= lengths[:, None]
+    dj = d[:, :, None] * d[:, None, :]
+    rows, columns = np.concatenate([s, t, s, t]), np.concatenate([t, s, s, t])
+    blocks = np.concatenate([-dj, -dj, dj, dj])
+    axes = np.arange(dim)
+    i = np.broadcast_to(rows[:, None, None] * dim + axes[:, None], blocks.shape).ravel()
+    j = np.broadcast_to(columns[:, None, None] * dim + axes, blocks.shape).ravel()
+    return sparse.coo_array((blocks.ravel(), (i, j)), shape=(points.size, points.size)).tocsr()
+
+
+def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
+    """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
+
+    Their columns go to the right side, their rows and columns become those of the unit matrix. A vertex named twice is
+    refused: the listing would take the first value to the neighbours and the last to the vertex.
+    """
+    vertices = bounds[0].astype(np.int64)
+    if len(np.unique(vertices)) < len(vertices):
+        raise InputError("bounds", "a vertex named twice", "one value for each vertex")
+    fixed = (vertices[:, None] * dim + np.arange(dim)).ravel()
+    values = np.zeros(len(b))
+    values[fixed] = np.repeat(bounds[1], dim)
+    free = np.ones(len(b))
+    free[fixed] = 0
+    keep = sparse.diags_array(free)
+    return keep @ A @ keep + sparse.diags_array(1 - free), np.where(free > 0, b - A @ values, values)
+
+
+def right_side(points: Floats) -> Floats:
+    """Listing 4.5, line 17: (n dim,), 1 for every component of the ``points`` (n, dim) whose y is above average, else 0.
+
+    The mean is summed from the first point to the last, as Octave does, lest a point at the average fall on the other side.
+    """
+    y = points[:, 1]
+    return np.repeat((y > np.cumsum(y)[-1] / len(y)).astype(np.float64), points.shape[1])
+
+
+def fem2d(triangles: Ints, points: Floats, bounds: Floats) -> tuple[Floats, Floats]:
+    """Listing 4.5 over ``triangles`` (m, 3) of ``points`` (n, 2 or 3): its x (n,), and the vector unknown (n, dim) that x is the
+    norm of. What the listing draws is -x.
+
+    ``(26 A A + 2 A + 0.05) u = b`` with A of listing 4.2, positive semidefinite, on the side of minus a second derivative: of order
+    4, 2 and 0, where the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` is of order 2, 1 and 0.
+    """
+    dim = points.shape[1]
+    A = first_derivative(triangles, points)
+    operator = SQUARE * A @ A + LINEAR * A + CONSTANT * sparse.eye_array(points.size)
+    operator, b = dirichlet(operator, right_side(points), dim, bounds)
+    unknown = np.reshape(spsolve(operator.tocsc(), b), points.shape)
+    return np.linalg.norm(unknown, axis=1), unknown
 
 
 SOLVES = (FieldSolver(settings=ListingSettings, solve=solve, check_problem=check, example={}),)

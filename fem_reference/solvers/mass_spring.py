@@ -120,7 +120,7 @@ class MassSpringModel:
     bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 
-    def __init__(self, problem: MuscleProblem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
+    def __init__(self, problem: MuscleProblem, settings: MassSpringSettings) -> None:
         mesh, collision, locator = problem.mesh, settings.collision, Locator(problem.mesh)
         self.problem, self.settings, self.network = problem, settings, network_of(mesh, settings)
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
@@ -139,7 +139,7 @@ class MassSpringModel:
         self.steps = max(1, math.ceil(self.wanted - 1e-9))
         self.time_step = settings.frame_time / self.steps
         free = len(self.points) - len(self.fixed)
-        self.cost: dict[str, float] = {"seconds_compile": seconds_compile, "unknowns": 3.0 * free, "time_steps": 0}
+        self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
 
     @property
     def advice(self) -> str:
@@ -205,7 +205,9 @@ class MassSpringModel:
 
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    model = MassSpringModel(problem, settings, _compile(settings))
+    seconds = _compile(settings)
+    model = MassSpringModel(problem, settings)
+    model.cost["seconds_compile"] = seconds
     if model.wanted > _MOST_STEPS:
         why = Trouble("out of steps", _too_many(model.wanted, settings, model.network))
         return refused(model, problem.frames[0], sink, why)
@@ -222,15 +224,11 @@ def _too_many(steps: float, settings: MassSpringSettings, network: Network) -> s
 
 
 def _compile(settings: MassSpringSettings) -> float:
-    """Run every compiled function once, on one spring; seconds."""
+    """Run every compiled function in one step of a tetrahedron; seconds."""
     begin = time.perf_counter()
-    points, nothing = np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((0, 3))
-    network = Network(np.ones(2), np.array([[0, 1]]), np.ones(1), 1.0, 0.0, np.zeros(3))
-    advance(points, points.copy(), network, PrescribedPath(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
-    forces(points, network)
-    if settings.collision is not None:
-        tet, nobody = tetrahedron(), np.zeros(0, np.int64)
-        move_out(np.zeros((4, 3)), colliding_bones(tet.bones, tet.surface.points, nobody, 0.0), 1.0)
+    first = MassSpringModel(tetrahedron(), settings.model_copy(update={"time_step": settings.frame_time}))
+    first.move(1)
+    first.frame(1)
     return time.perf_counter() - begin
 
 

@@ -125,7 +125,8 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
         )
     frames = []
     for number in setup.frames:
-        surface = _surface(sequence[number], settings.unit)
+        entry = sequence[number]
+        surface = entry if isinstance(entry, Surface) else files.read_surface(entry, settings.unit)
         positions = _positions(surface, setup.surface)
         frames.append(Frame(number, positions))
         if number == setup.frames[0]:
@@ -173,16 +174,14 @@ def _visible(folder: Path) -> list[Path]:
 
 def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Path | Surface]:
     """The surfaces by frame number, or the files that they are in."""
+    entries: Iterable[tuple[int | None, str, Path | Surface]]
     if source.suffix.lower() == ".xdmf":
         steps = files.read_xdmf(source, unit)
-        return _by_number(source, ((_number(time, interval), step.place, step) for time, step in steps))
-    if source.suffix.lower() == ".pvd":
-        entries = files.read_pvd(source)
-        return _by_number(source, ((_number(time, interval), path.name, path) for time, path in entries))
-    return _by_number(source, ((_number_in(path), path.name, path) for path in _visible(source)))
-
-
-def _by_number(source: Path, entries: Iterable[tuple[int | None, str, Path | Surface]]) -> dict[int, Path | Surface]:
+        entries = ((_number(time, interval), step.place, step) for time, step in steps)
+    elif source.suffix.lower() == ".pvd":
+        entries = ((_number(time, interval), path.name, path) for time, path in files.read_pvd(source))
+    else:
+        entries = ((_number_in(path), path.name, path) for path in _visible(source))
     found: dict[int, tuple[str, Path | Surface]] = {}
     for number, name, frame in entries:
         if number in found:
@@ -202,10 +201,6 @@ def _number(time: float, interval: float | None) -> int | None:
     """The frame number that ``time`` is of, None where it is between two."""
     number = time if interval is None else time / interval
     return round(number) if math.isfinite(number) and abs(number - round(number)) < ON_FRAME else None
-
-
-def _surface(frame: Path | Surface, unit: float) -> Surface:
-    return frame if isinstance(frame, Surface) else files.read_surface(frame, unit)
 
 
 def _positions(surface: Surface, rest: Surface) -> Floats:

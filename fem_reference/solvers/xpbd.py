@@ -154,10 +154,6 @@ class BoneContact:
         self.bone, self.softness = bone, softness
         self.multipliers = np.zeros(len(softness))
 
-    def begin(self) -> None:
-        """A time step begins: no contact yet."""
-        self.multipliers[:] = 0
-
     def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
         """The displacements (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
         vertices, value, away = self.bone.near(points)
@@ -185,7 +181,7 @@ def advance(
     of_edges, of_hinges, of_volume = np.zeros(len(at.edges)), np.zeros(len(at.hinges)), 0.0
     edges, hinges, enclosed = at.edge_softness / dt**2, at.hinge_softness / dt**2, at.volume_softness / dt**2
     for contact in contacts:
-        contact.begin()
+        contact.multipliers[:] = 0
     for _ in range(step.sweeps):
         pull_distances(moved, at.inverse_masses, at.edges, at.lengths, edges, of_edges)
         of_volume = pull_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, enclosed, of_volume)

@@ -13,7 +13,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Turn
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import clamped, control, find, mooney_rivlin, neo_hooke, sliding
+from fem_reference.verification.parts import SLOW, clamped, control, find, mooney_rivlin, neo_hooke, sliding
 
 rivlin = find("rivlin")
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The truths are of incompressible material.
@@ -68,7 +68,7 @@ def circle(points: Floats) -> float:
     return float(np.sqrt(c + a**2 + b**2))
 
 
-# What is read from nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
+# Readings of nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
 # to the nodes of the inner face [mm], and the distance between the curved faces, halfway between the ends [mm].
 READINGS: dict[str, Reading] = {
     "moment": lambda _, state: float(state.moments["y1"][2] / WIDTH),
@@ -192,8 +192,7 @@ ENTRIES: tuple[Entry, ...] = (
             within=within,
             because=f"discretisation of order 4, {left} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
             refinement=Refinement(counts, RADIUS / 2, order=4),
-            slow=True,
-            slow_negative_control=True,
+            **SLOW,
         )
         for cells, element, within, left, counts in (
             ("tetrahedra", "P2/P1", 5e-4, "8e-5 with 8", (1, 2, 4)),
@@ -211,8 +210,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-3,
         because="discretisation of order 4, 1.7e-4 with 6 cells along the radius: a force of second order in the twist",
         refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
-        slow=True,
-        slow_negative_control=True,
+        **SLOW,
     ),
     CYLINDER(
         name="torsion_moment_mooney_rivlin",

@@ -15,7 +15,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import SYMMETRY, clamped, control, find, neo_hooke
+from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, neo_hooke
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
@@ -70,26 +70,20 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-def force(state: Frame) -> float:
-    """The force of the whole ball [N]."""
-    return 4 * float(state.forces["ball"][2])
+# The force of the whole ball [N]; the radius [mm] from the lever of the force on the quarter, as Hertz's pressures have their
+# middle at 3/8 of it; the greatest pressure [MPa].
+READINGS: dict[str, Callable[[Frame], float]] = {
+    "force": lambda state: 4 * float(state.forces["ball"][2]),
+    "contact_radius": lambda state: 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2]),
+    "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
+}
 
 
-def contact_radius(state: Frame) -> float:
-    """The radius [mm] from the lever of the force on the quarter: Hertz's pressures have their middle at 3/8 of it."""
-    return 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2])
-
-
-def peak_pressure(state: Frame) -> float:
-    """The greatest pressure [MPa]."""
-    return float(state.scalars["contact_pressure"])
-
-
-def ball(lab: Lab, value: Callable[[Frame], float], radius: float) -> Finding:
-    """A ``value`` of the pressed body."""
+def ball(lab: Lab, reading: str, radius: float) -> Finding:
+    """A reading of the pressed body."""
     state = pressed(lab, 4, radius)
     depth = 1000 * state.scalars["contact_depth"]
-    return Finding(value(state), note=f"the ball is {depth:.1f} micrometres deep in the body")
+    return Finding(READINGS[reading](state), note=f"the ball is {depth:.1f} micrometres deep in the body")
 
 
 def known_ball(name: str) -> float:
@@ -126,21 +120,20 @@ ENTRIES = (
             title=f"A rigid ball pressed into a large body: {words}",
             unit=unit,
             measure=ball,
-            given={"value": value, "radius": RADIUS},
+            given={"reading": reading, "radius": RADIUS},
             **control("a ball of twice the radius", radius=2 * RADIUS),
-            truth=partial(known_ball, value.__name__),
+            truth=partial(known_ball, reading),
             within=0.02,
             relative=True,
             because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
             kind="closed form",
             source="Hertz 1882; validation/hertz.py",
-            slow=True,
-            slow_negative_control=True,
+            **SLOW,
         )
-        for name, words, unit, value in (
-            ("force", "its force", "N", force),
-            ("radius", "the radius of the contact", "mm", contact_radius),
-            ("pressure", "the greatest pressure", "MPa", peak_pressure),
+        for name, words, unit, reading in (
+            ("force", "its force", "N", "force"),
+            ("radius", "the radius of the contact", "mm", "contact_radius"),
+            ("pressure", "the greatest pressure", "MPa", "peak_pressure"),
         )
     ),
 )

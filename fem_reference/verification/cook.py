@@ -15,7 +15,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
-from fem_reference.verification.parts import clamped, control, find, nearest, neo_hooke, ramp, sliding
+from fem_reference.verification.parts import SLOW, clamped, control, find, nearest, neo_hooke, ramp, sliding
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
@@ -162,8 +162,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=cook.FINITE_QUARTER.tip,
         within=0.001,
         because="discretisation: 0.02 % too stiff",
-        slow=True,
-        slow_negative_control=True,
+        **SLOW,
     ),
     TIP(
         name="cook_full_load",

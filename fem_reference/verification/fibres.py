@@ -57,7 +57,7 @@ def muscle(fibres: Material, stretch: float) -> Specimen:
 
 
 def free(material: Material) -> Specimen:
-    """A block that nothing pulls."""
+    """A block without a load."""
     return Specimen(material, "P2/P1", "pulled", 0.0)
 
 

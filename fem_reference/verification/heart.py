@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells
 from fem_reference.problems.paths import Along
-from fem_reference.verification.parts import clamped, control, find, nearest, ramp, resistance, sliding
+from fem_reference.verification.parts import SLOW, clamped, control, find, nearest, ramp, resistance, sliding
 
 land = find("land")
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
@@ -24,24 +24,19 @@ ENDO, EPI = (0.0, 0.0, -17.0), (0.0, 0.0, -20.0)
 Point = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Helix:
-    """The fibres of problem 3, from +90 degrees inside to -90 degrees outside."""
-
-    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """Unit vectors (n, 3) at rest points (n, 3) [mm]."""
-        return np.asarray(land.fibre(points))
+def helix(cells: Ints, points: Floats) -> Floats:  # noqa: ARG001
+    """The fibres of problem 3, from +90 degrees inside to -90 degrees outside: unit vectors (n, 3) at rest points (n, 3) [mm]."""
+    return np.asarray(land.fibre(points))
 
 
 @dataclass(frozen=True)
 class Heart:
-    """A problem as it is solved: by an ``element``, on cells of ``degree`` (1 straight, 2 curved) and of a ``bulk`` modulus [MPa];
-    its stiffness and its active tension are off by the factors ``stiff`` and ``active``.
+    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension wrong by
+    the factors ``stiff`` and ``active``.
     """
 
     element: str
     degree: int = 2
-    bulk: float = BULK
     stiff: float = 1.0
     active: float = 1.0
 
@@ -51,7 +46,7 @@ class Heart:
         law, tension = problem.law, problem.tension * self.active
         acting = (
             make("guccione", c=f"{law.c * self.stiff} MPa", bf=law.bf, bt=law.bt, bfs=law.bfs),
-            resistance(self.element, self.bulk),
+            resistance(self.element, BULK),
             make("pressure", on=on, pressure=f"{problem.pressure} MPa", ramp=ramp()),
         )
         return (*acting, make("active_tension", tension=f"{tension} MPa", ramp=ramp())) if tension else acting
@@ -73,7 +68,7 @@ class Heart:
     def contracting(self, n: int) -> Body:
         """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
-        return Body(mesh, self.effects(3, "endo"), clamped("base"), (0.0, 1.0), Helix())
+        return Body(mesh, self.effects(3, "endo"), clamped("base"), (0.0, 1.0), helix)
 
 
 def height(lab: Lab, n: int, body: str, point: Point, **heart: Any) -> float:
@@ -108,8 +103,7 @@ HEART = partial(
     kind="published",
     source="Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py",
     refinement=Refinement((2, 3), AROUND, order=None),  # the truth is published with few digits: no order
-    slow=True,
-    slow_negative_control=True,
+    **SLOW,
 )
 APICES = {"inside": (0, ENDO), "outside": (1, EPI)}
 FINE = "the mesh leaves 0.2 %"

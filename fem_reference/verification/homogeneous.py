@@ -16,7 +16,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine, Along, Matrix, radially
 from fem_reference.runs.store import Frame
-from fem_reference.verification.parts import SURFACE, SYMMETRY, control, find, resistance
+from fem_reference.verification.parts import NO_GRADIENT, SURFACE, SYMMETRY, control, find, resistance
 
 laws = find("laws")
 Vector = tuple[float, float, float]
@@ -62,16 +62,12 @@ def everywhere(gradient: Matrix) -> tuple[Prescribed, ...]:
     return tuple(Prescribed(face, face, (0, 1, 2), Affine(gradient)) for face in SURFACE)
 
 
-def _sheared(amount: float) -> tuple[Prescribed, ...]:
-    return everywhere(((0.0, amount, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-
-
 # By name of a function of validation/homogeneous.py: what is prescribed for a stretch or an amount, and the face that is pulled.
 MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
     "uniaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch)), "x1"),
     "equibiaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch), stretched("y1", stretch)), "x1"),
     "planar": (lambda stretch: (*SYMMETRY, stretched("x1", stretch), stretched("y1", 1.0)), "x1"),
-    "simple_shear": (_sheared, "y1"),
+    "simple_shear": (lambda amount: everywhere(((0.0, amount, 0.0), *NO_GRADIENT[1:])), "y1"),
     "pulled": (lambda _: SYMMETRY, "x1"),
 }
 

@@ -36,7 +36,7 @@ def weight(axis: int, acceleration: float) -> Effect:
 
 
 def fallen(lab: Lab, factor: float) -> float:
-    """The fall [mm] of a block that nothing holds, so that mass alone is what its tangent has."""
+    """The fall [mm] of a free block, whose tangent has mass alone."""
     mesh = shapes.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     acting = (*neo_hooke(MU, 1e3 * MU), mass(factor), weight(2, -G))
     solved = lab.solve(Body(mesh, acting, (), frames(10, 10), interval=FALLING / 10), "P2/P1", **STEP)

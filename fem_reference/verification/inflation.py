@@ -18,7 +18,7 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
-from fem_reference.verification.parts import SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
+from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
@@ -160,8 +160,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
-        slow=True,
-        slow_negative_control=True,
+        **SLOW,
     ),
     FINITE(
         name="inflation_sphere_stretch",
@@ -195,8 +194,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: TRUE_SPHERE.limit_point()[0],
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
-        slow=True,
-        slow_negative_control=True,
+        **SLOW,
     ),
     LIMIT(
         name="inflation_fall_beyond_limit",

@@ -21,6 +21,7 @@ from fem_reference.scenes.case import HOME
 
 TRUTHS = HOME / "validation"
 SURFACE = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box
+SLOW: dict[str, Any] = {"slow": True, "slow_negative_control": True}  # of an entry
 NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
 
 

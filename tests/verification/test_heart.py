@@ -26,5 +26,5 @@ def test_fibres_turn_through_the_wall() -> None:
     """Along the meridian inside and outside, around in the middle: at y = 0, x > 0 in the x-z plane and along y."""
     land = find("land")
     middle = land.wall(np.full(3, -2.0), np.zeros(3), np.array([0.0, 0.5, 1.0]))
-    fibres = heart.Helix()(np.zeros(3, np.int64), middle)
+    fibres = heart.helix(np.zeros(3, np.int64), middle)
     np.testing.assert_allclose(np.abs(fibres[:, 1]), [0, 1, 0], atol=1e-9)

@@ -50,15 +50,6 @@ class CheckProblem[S: Record](Protocol):
         """
 
 
-def _nothing(_: Record) -> None:
-    """Require nothing beyond this package."""
-
-
-def _none(_: Record) -> bool:
-    """No fibres."""
-    return False
-
-
 class TableRow(NamedTuple):
     """A row of the page table-5-1: a solver, as ``name`` within a ``kind`` of the report's Table 5.1, with the same ``settings``
     on every scene, as scene files write them.
@@ -85,7 +76,7 @@ class Solver[P, S: Record]:
     settings: type[S]
     solve: Solve[P, S]
     example: Mapping[str, Any]
-    require: Callable[[S], None] = _nothing
+    require: Callable[[S], None] = lambda _: None
     check_problem: CheckProblem[S] | None = None
     slow: bool = False
     table: tuple[TableRow, ...] = ()
@@ -112,7 +103,7 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
 
     moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
-    fibres: Callable[[S], bool] = _none
+    fibres: Callable[[S], bool] = lambda _: False
 
     def fills(self, settings: S) -> bool:
         """True where it needs the muscle filled with tetrahedra and fibres."""

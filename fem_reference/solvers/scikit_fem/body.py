@@ -136,7 +136,8 @@ class March:
         """The record of Newton's method at ``frame``, and the unknowns (N,) that it ends with."""
         fixed, wanted = self.fixed(frame)
         free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
-        now, allowed = self._tangent(self.unknowns.copy(), frame), self.settings.newton_iterations
+        start, allowed = self.unknowns.copy(), self.settings.newton_iterations
+        now = _Tangent(start, *self.equations.assembled(start, frame))
         rounding = _ROUNDING * np.ptp(self.equations.space.rest, axis=0).max()
         residuals: list[float] = []
 
@@ -161,16 +162,14 @@ class March:
                 return ended("no part of a Newton step has bounded forces")
             now = then
 
-    def _along(self, now: "_Tangent", step: Floats, free: Ints, limit: float, frame: float) -> "_Tangent | None":
+    def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
         """The equations after as much of ``step`` as leaves the forces on ``free`` unknowns below ``limit``."""
         for halvings in range(_HALVINGS):
-            then = self._tangent(now.unknowns + 0.5**halvings * step, frame)
+            unknowns = now.unknowns + 0.5**halvings * step
+            then = _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
             if np.linalg.norm(then.residual[free]) < limit:
                 return then
         return None
-
-    def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
-        return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
 
     def fixed(self, frame: float) -> tuple[Ints, Floats]:
         """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""

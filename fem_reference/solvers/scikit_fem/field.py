@@ -15,7 +15,7 @@ from skfem.helpers import grad
 from skfem.mesh import MeshTri1DG
 
 from fem_reference.effects import FieldState, Place
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import FieldProblem, at
@@ -183,15 +183,8 @@ def _fluxes(problem: FieldProblem) -> Floats:
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         for s, weight in zip(*_GAUSS, strict=True):
             flow = weight * lengths * problem.diffusion * at(flux.slope, (1 - s) * ends[:, 0] + s * ends[:, 1])
-            if problem.order == 1:
-                hats: tuple[tuple[Ints, float], ...] = ((edges[:, 0], 1 - s), (edges[:, 1], s))
-            else:
-                hats = (
-                    (edges[:, 0], (1 - s) * (1 - 2 * s)),
-                    (edges[:, 1], s * (2 * s - 1)),
-                    (middles, 4 * s * (1 - s)),
-                )
-            for nodes, hat in hats:
+            hats = (1 - s, s) if problem.order == 1 else ((1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s))
+            for nodes, hat in zip((*edges.T, middles), hats, strict=False):  # order 1 has no middles
                 np.add.at(b, nodes, hat * flow)
     return b
 
