@@ -15,6 +15,8 @@ from fem_reference.foundations.records import parse
 from fem_reference.io import texts
 
 FORMAT = 1
+# Features of a case that can be, in any of their units.
+_LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
 # The features by which recommendations compare cases; those that they divide by are above zero.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
@@ -108,21 +110,36 @@ def _read(table: Any, place: str) -> CaseStudy:
 
 def _check(study: CaseStudy, place: str) -> None:
     """Raise InputError below ``place`` where a study lacks a feature, has an unknown unit, or unusable points."""
-    for name in FEATURES:
-        if name not in study.features:
-            raise InputError(f"{place}: features.{name}", "nothing", "this number: the verb study makes it anew")
-        if name in _ABOVE_ZERO and not study.features[name] > 0:
-            raise InputError(f"{place}: features.{name}", f"{study.features[name]:g}", "more than 0")
+    _check_features(study, place)
+    for name, bar in study.bars.items():
+        if not bar <= _MOST:
+            raise InputError(f"{place}: bars.{name}", f"{bar:g}", f"at most {_MOST:g}")
     known = metrics.units()
     for name, unit in study.units.items():
         if unit != known.get(name, unit) or unit not in known.values():
             want = known.get(name) or f"one of {', '.join({*known.values()})}"
             raise InputError(f"{place}: units.{name}", f'"{unit}"', want)
     for i, point in enumerate(study.points):
-        for name in point.errors:
+        for name, error in point.errors.items():
             if name not in study.units:
                 raise InputError(f"{place}: points[{i}].errors.{name}", "an error without a unit", f"units.{name}")
+            if not error <= _MOST:
+                raise InputError(f"{place}: points[{i}].errors.{name}", f"{error:g}", f"at most {_MOST:g}")
         _check_scene(point.choice.get("scene", {}), f"{place}: points[{i}].choice.scene")
+
+
+def _check_features(study: CaseStudy, place: str) -> None:
+    """Raise InputError below ``place`` where a study lacks a feature, or it is none that a case can have."""
+    for name in FEATURES:
+        if name not in study.features:
+            raise InputError(f"{place}: features.{name}", "nothing", "this number: the verb study makes it anew")
+        value = study.features[name]
+        if name in _ABOVE_ZERO and not value > 0:
+            raise InputError(f"{place}: features.{name}", f"{value:g}", "more than 0")
+        if value and not _LEAST <= abs(value) <= _MOST:
+            raise InputError(f"{place}: features.{name}", f"{value:g}", f"0, or a number from {_LEAST:g} to {_MOST:g}")
+    if not abs(study.features["refinements"]) <= _FINEST:
+        raise InputError(f"{place}: features.refinements", f"{study.features['refinements']:g}", f"at most {_FINEST}")
 
 
 def _check_scene(scene: Any, place: str) -> None:
