@@ -17,7 +17,7 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
-_POINTS = 40  # of each line
+POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
 # Seeds whose relative difference is less are ordered by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
@@ -104,8 +104,8 @@ def trace(field: FibreField, count: int) -> Polylines:
     whole = np.flatnonzero(came_back & came_ahead)[:count]
     if len(whole) < count:
         raise InputError("fibres.traced.count", count, f"at most {len(whole)}, the fibres that could be traced")
-    lines = [_resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
-    return Polylines(np.concatenate(lines), np.arange(count + 1) * _POINTS)
+    lines = [resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
+    return Polylines(np.concatenate(lines), np.arange(count + 1) * POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +213,8 @@ def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:
     return np.asarray(points + step / 6 * (first + 2 * second + 2 * third + fourth))
 
 
-def _resample(line: Floats) -> Floats:
+def resample(line: Floats) -> Floats:
     """The line (k, 3) by 40 points at equal distances along it."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    at = np.linspace(0, along[-1], _POINTS)
+    at = np.linspace(0, along[-1], POINTS)
     return np.stack([np.interp(at, along, line[:, axis]) for axis in range(3)], axis=1)

@@ -11,6 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.foundations.records import join
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.fibre_templates import contours, mapped
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
 from fem_reference.geometry.patches import draped, fan
 from fem_reference.geometry.sectors import shares_at
@@ -120,23 +121,35 @@ TETS = 8000
 
 
 def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case, and their direction at any point. They are given as polylines, with the direction of the
-    nearest, or traced in tetrahedra of a size [mm] with which ``fill`` fills the closed ``surface`` of the muscle.
+    """The fibres of a case in the closed ``surface`` of its muscle, and their direction at any point."""
+    lines, directions = lines_of(case, surface, fill)
+    return (lines if case.fibres.traced else inside(surface, lines)), directions
+
+
+def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
+    """The fibres of a case as their source has them, in part outside the ``surface``, and their direction at any point: that of
+    the nearest, or of a Laplace field. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
     """
     if (lines := _given(case)) is not None:
-        return inside(surface, lines), NearestLine(lines)
-    traced = case.fibres.traced
-    assert traced is not None  # a Fibres record has one of the two
+        return lines, NearestLine(lines)
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
-    field = fibre_field(mesh, traced.start, traced.end)
-    return trace(field, traced.count), field
+    field = fibre_field(mesh, *case.fibres.ends.values())
+    if (traced := case.fibres.traced) is not None:
+        return trace(field, traced.count), field
+    asked = case.fibres.kohout_kukacka
+    assert asked is not None  # a Fibres record has one source
+    towards = None if asked.towards is None else np.array(asked.towards)
+    lines = mapped(field, contours(field, asked.contours, towards), asked.count, asked.pennation or 0.0)
+    return lines, NearestLine(lines)
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
     it. It is the shear by their tension. 0 for fibres that are traced from one attachment to the other.
     """
+    if (asked := case.fibres.kohout_kukacka) is not None:
+        return float(np.sin(2 * (asked.pennation or 0.0)))
     if (lines := _given(case)) is None:
         return 0.0
     pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)

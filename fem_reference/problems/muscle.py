@@ -134,7 +134,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
     begin = time.perf_counter()
     contact = among(case.effects)
     distances_known = {} if contact is None else _distances(case, rest, contact)
-    mesh = _filled(case, rest, case.muscle.tet_size)
+    mesh = filled(case, rest, case.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
     for _ in range(case.muscle.refinements):
         mesh = refined(mesh, rest.surface, exact)
@@ -142,7 +142,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibres_of(case, rest.surface, partial(_filled, case, rest))
+    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
     apart, asked = spacing(rest.surface), (*case.effects, *(one.effect for one in case.decisions))
     return MuscleProblem(
         *(rest.surface, rest.bones, rest.attached, rest.frames, rest.interval),
@@ -182,7 +182,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
     }
 
 
-def _filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
+def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     blocks = case.muscle.mesher == "block"

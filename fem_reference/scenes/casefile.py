@@ -221,10 +221,8 @@ def _check_names(case: MuscleCase) -> None:
     attachments = [attachment.name for attachment in case.attachment]
     check_acting(case.effects, bones, case.frames, case.place)
     _check_once([*attachments, FREE], join(case.place, "attachment"))
-    traced = case.fibres.traced
-    ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
-    _check_used(attachments, ends, case.place)
+    _check_used(attachments, list(case.fibres.ends.items()), case.place)
     _check_forces(case)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(case.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, case.place)

@@ -13,6 +13,7 @@ from fem_reference.foundations.records import Name, Record
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
+from fem_reference.scenes.fibres import Fibres
 
 # Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
 _FINEST = 1e-3
@@ -200,34 +201,6 @@ class Attachment(Record):
     def _check(self) -> Self:
         if sum(one is not None for one in (self.vertices, self.within, self.outline)) != 1:
             raise ValueError('exactly one of "vertices", "within", "outline"')
-        return self
-
-
-class PolylineFile(Record):
-    """Fibres given as polylines in a file."""
-
-    file: str
-    unit: LengthUnit
-
-
-class Traced(Record):
-    """Fibres traced along the gradient of a Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
-
-    count: int = Field(gt=0, le=100_000)
-    start: str
-    end: str
-
-
-class Fibres(Record):
-    """The fibres whose lengths are measured: exactly one of ``polylines`` and ``traced``."""
-
-    polylines: PolylineFile | None = None
-    traced: Traced | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if (self.polylines is None) == (self.traced is None):
-            raise ValueError('exactly one of "polylines", "traced"')
         return self
 
 

@@ -19,6 +19,7 @@ from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.anatomy import facets_under, pick
 from fem_reference.problems.estimates import estimates
 from fem_reference.scenes import casefile
+from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, MuscleCase
 
 BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
@@ -300,3 +301,23 @@ def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:
     assert lines.lengths() == pytest.approx(40, rel=1e-2)
     along = direction(np.zeros(2, int), np.array([[5.0, 5, 20], [3, 4, 11]]))
     assert along == pytest.approx(np.tile([0.0, 0, 1], (2, 1)), abs=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [0, 15])
+def test_a_template_is_a_source_of_fibres(bar, degrees: int) -> None:
+    """Parallel and pennate lines of a bar, whose directions are those of the case; they lean by the closed form."""
+    asked = {
+        "count": 5,
+        "start": "bottom",
+        "end": "top",
+        "contours": 10,
+        "template": "pennate" if degrees else "parallel",
+    }
+    inclined = {"pennation": f"{degrees} deg", "towards": (1, 0, 0)} if degrees else {}
+    case = casefile.read(bar).model_copy(update={"fibres": Fibres(kohout_kukacka={**asked, **inclined})})
+    box = shapes.box((3, 3, 8), (10.0, 10.0, 40.0))
+    lines, directions = anatomy.fibres_of(case, shapes.skin(box), lambda _: box)
+    along = directions(np.zeros(1, int), np.array([[5.0, 5.0, 20.0]]))[0]
+    assert np.degrees(np.arctan2(along[0], along[2])) == pytest.approx(degrees, abs=0.1)
+    assert len(lines) == 5
+    assert anatomy.lean(case, np.array([0, 0, 1.0])) == pytest.approx(np.sin(np.radians(2 * degrees)))

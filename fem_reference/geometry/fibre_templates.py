@@ -1,0 +1,156 @@
+"""Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
+
+Theirs has isocontours on the surface; here each is the rim of a section of the Laplace field in tetrahedra, and the points inside
+come from a harmonic map of that section, so that they are in the muscle. One difference is left: a muscle with several heads is
+followed along its greatest section only.
+"""
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from scipy.signal import savgol_filter
+from scipy.stats import qmc
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines
+from fem_reference.geometry.cross_sections import CrossSection, cross_section
+from fem_reference.geometry.curves import bezier
+from fem_reference.geometry.fibres import POINTS, FibreField, resample
+
+PLACE = "fibres.kohout_kukacka"
+_WINDOW = 7  # points of a line through which smoothing lays a parabola
+_SHORTEST = 0.1  # of the longest pennate fibre's extent along the muscle
+
+
+@dataclass(frozen=True, eq=False)
+class Contours:
+    """``sections`` of a muscle from one attachment to the other, the place of their points in the unit ``squares``, and their
+    ``heights`` (k,) between 0 and 1, by length along their centres; ``length`` of that line and mean ``width`` along the squares'
+    first side [mm].
+    """
+
+    sections: tuple[CrossSection, ...]
+    squares: tuple[Floats, ...]
+    heights: Floats
+    length: float
+    width: float
+
+    def place(self, cube: Floats) -> Floats:
+        """Points (n, 3) [mm] of places (n, 3) in the unit ``cube``, linear between sections and beyond the last."""
+        last = len(self.heights) - 2
+        below = np.clip(np.searchsorted(self.heights, cube[:, 2], side="right") - 1, 0, last)
+        found = np.empty_like(cube)
+        for i in np.unique(below):
+            some = below == i
+            low, high = (self._on(k, cube[some, :2]) for k in (i, i + 1))
+            share = (cube[some, 2] - self.heights[i]) / (self.heights[i + 1] - self.heights[i])
+            found[some] = low + share[:, None] * (high - low)
+        return found
+
+    def _on(self, i: int, places: Floats) -> Floats:
+        """Points (n, 3) on section ``i`` of ``places`` (n, 2) in its square."""
+        square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
+        _, hit, closest = igl.point_mesh_squared_distance(np.pad(places, ((0, 0), (0, 1))), square, triangles)
+        corners = np.ascontiguousarray(square[triangles[hit]])
+        shares = igl.barycentric_coordinates(closest, *(np.ascontiguousarray(corners[:, k]) for k in range(3)))
+        return np.asarray(np.einsum("nk,nkd->nd", shares, self.sections[i].points[triangles[hit]]))
+
+
+def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
+    """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
+
+    The first side of the middle one's square is along ``towards`` (3,), without it along its longest axis; the others' sides
+    follow by the least turn from section to section.
+    """
+    means = field.values[field.mesh.tets].mean(axis=1)
+    levels = np.quantile(means, (np.arange(count) + 0.5) / count)
+    sections = tuple(one for level in levels if (one := cross_section(field.mesh, field.values, level)) is not None)
+    if len(sections) < 2:
+        raise InputError(f"{PLACE}.contours", f"{len(sections)} sections in one piece without holes", "two at least")
+    moments = [one.moments for one in sections]
+    ends = [field.mesh.points[facets].mean(axis=(0, 1)) for facets in (field.start, field.end)]
+    centres = np.array([ends[0], *(centre for centre, _ in moments), ends[1]])
+    along = np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))
+    middle = len(sections) // 2
+    firsts = _firsts(sections, middle, _first(sections[middle], moments[middle][1], towards))
+    widths = [np.sqrt(12 * first @ product @ first) for first, (_, product) in zip(firsts, moments, strict=True)]
+    squares = tuple(one.square(first) for one, first in zip(sections, firsts, strict=True))
+    return Contours(sections, squares, along[:-1] / along[-1], float(along[-1]), float(np.mean(widths)))
+
+
+def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
+    """The unit vector (3,) in the ``middle`` section along ``towards``, or its longest axis, whose greatest part is positive."""
+    if towards is None:
+        longest = np.linalg.eigh(product)[1][:, 2]
+        towards = longest * np.sign(longest[np.argmax(np.abs(longest))])
+    flat = towards - (towards @ middle.normal) * middle.normal
+    if np.linalg.norm(flat) < 1e-6 * np.linalg.norm(towards):
+        raise InputError(f"{PLACE}.towards", "a direction along the muscle", "one across it")
+    return np.asarray(flat / np.linalg.norm(flat))
+
+
+def _firsts(sections: tuple[CrossSection, ...], middle: int, first: Floats) -> list[Floats]:
+    """The first direction (3,) of each section, from the ``middle`` one's in both directions."""
+    found = {middle: first}
+    ahead = [(i, i + 1) for i in range(middle, len(sections) - 1)]
+    back = [(i, i - 1) for i in range(middle, 0, -1)]
+    for known, other in ahead + back:
+        found[other] = _turned(found[known], sections[known].normal, sections[other].normal)
+    return [found[i] for i in range(len(sections))]
+
+
+def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
+    """The ``vector`` (3,) by the least turn from unit vector ``one`` to unit vector ``other``."""
+    axis = np.cross(one, other)
+    once = np.cross(axis, vector)
+    turned = vector + once + np.cross(axis, once) / np.maximum(1 + one @ other, 1e-6)
+    flat = turned - (turned @ other) * other
+    return np.asarray(flat / np.linalg.norm(flat))
+
+
+def template(count: int, slope: float) -> Floats:
+    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton): parallel to its third axis, or
+    inclined to the first axis by the ``slope`` and cut off at the cube's sides.
+    """
+    across = qmc.Halton(2, scramble=False).random(count + 1)[1:]
+    margin = _SHORTEST * min(slope, 1.0)
+    at = margin - slope + across[:, 0] * (1 + slope - 2 * margin)
+    low = np.maximum(0, -at / slope) if slope > 0 else np.zeros(count)
+    high = np.minimum(1, (1 - at) / slope) if slope > 0 else np.ones(count)
+    return np.stack([np.stack([at + slope * z, across[:, 1], z], axis=1) for z in (low, high)], axis=1)
+
+
+def mapped(field: FibreField, found: Contours, count: int, pennation: float = 0.0) -> Polylines:
+    """``count`` lines of 40 points along the muscle, inclined towards the squares' first side by ``pennation`` [rad], and
+    smoothed by parabolas. Lines that reach an end of the cube end on the attachment there.
+    """
+    curves = template(count, np.tan(pennation) * found.length / found.width)
+    samples = [_samples(ends, found.heights) for ends in curves]
+    placed = np.split(found.place(np.concatenate(samples)), np.cumsum([len(one) for one in samples])[:-1])
+    firsts, lasts = (np.array([line[end] for line in placed]) for end in (0, -1))
+    firsts = np.where(curves[:, 0, 2:] == 0, _closest(field, firsts, field.start), firsts)
+    lasts = np.where(curves[:, 1, 2:] == 1, _closest(field, lasts, field.end), lasts)
+    lines = [
+        _smooth(resample(np.concatenate([first[None], line[1:-1], last[None]])))
+        for first, line, last in zip(firsts, placed, lasts, strict=True)
+    ]
+    return Polylines(np.concatenate(lines), np.arange(count + 1) * POINTS)
+
+
+def _samples(ends: Floats, heights: Floats) -> Floats:
+    """Points (k, 3) of the Bezier curve of control points ``ends`` (2, 3): its ends, and one at each height between them."""
+    low, high = ends[:, 2]
+    between = heights[(heights > low + 1e-6) & (heights < high - 1e-6)]
+    return bezier(ends)((np.concatenate([[low], between, [high]]) - low) / (high - low))
+
+
+def _closest(field: FibreField, points: Floats, facets: Ints) -> Floats:
+    return np.asarray(igl.point_mesh_squared_distance(points, field.mesh.points, facets)[2])
+
+
+def _smooth(line: Floats) -> Floats:
+    """The line (40, 3) with each point on the parabola nearest to it and six neighbours; the ends stay."""
+    found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
+    found[[0, -1]] = line[[0, -1]]
+    return np.asarray(found)

@@ -1,0 +1,78 @@
+"""The sources of a muscle's fibres in a case: a file, a Laplace field, or a decomposition of its volume."""
+
+import math
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import Angle, LengthUnit
+
+# A template more inclined than this [rad] would have no fibre that is as long as the muscle is wide.
+_STEEPEST = math.radians(60)
+
+
+class PolylineFile(Record):
+    """Fibres given as polylines in a file."""
+
+    file: str
+    unit: LengthUnit
+
+
+class Traced(Record):
+    """Fibres traced along the gradient of a Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
+
+    count: int = Field(gt=0, le=100_000)
+    start: str
+    end: str
+
+
+class KohoutKukacka(Record):
+    """Fibres of a ``template`` in the unit cube, mapped to ``contours`` of the Laplace field between the attachments ``start``
+    and ``end``; those of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
+    """
+
+    count: int = Field(gt=0, le=10_000)
+    start: str
+    end: str
+    contours: int = Field(ge=4, le=1000)
+    template: Literal["parallel", "pennate"]
+    pennation: Angle | None = None
+    towards: tuple[float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        pennate = self.template == "pennate"
+        if (self.pennation is None) == pennate or (self.towards is None and pennate):
+            raise ValueError('"pennation" and "towards" with the template "pennate", no "pennation" with "parallel"')
+        if self.pennation is not None and not 0 < self.pennation <= _STEEPEST:
+            raise ValueError('"pennation" above 0 and up to 60 degrees')
+        if self.towards is not None and not 1e-9 < math.hypot(*self.towards) < 1e9:
+            raise ValueError('"towards" that is not zero, with a length from 1e-9 to 1e9')
+        return self
+
+
+class Fibres(Record):
+    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced`` and ``kohout_kukacka``."""
+
+    polylines: PolylineFile | None = None
+    traced: Traced | None = None
+    kohout_kukacka: KohoutKukacka | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        sources = tuple(type(self).model_fields)
+        if sum(getattr(self, source) is not None for source in sources) != 1:
+            raise ValueError(f"exactly one of {', '.join(f'"{source}"' for source in sources)}")
+        return self
+
+    @property
+    def ends(self) -> dict[str, str]:
+        """The attachments that the fibres run between, by the key that names them; none where a file has the fibres."""
+        between = {"traced": self.traced, "kohout_kukacka": self.kohout_kukacka}
+        return {
+            f"fibres.{source}.{end}": getattr(one, end)
+            for source, one in between.items()
+            if one is not None
+            for end in ("start", "end")
+        }

@@ -1,0 +1,106 @@
+"""Templates mapped to sections: straight, pennate and bent fibres as closed forms have them."""
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, TetMesh
+from fem_reference.geometry.embedding import embed
+from fem_reference.geometry.fibre_templates import contours, mapped, template
+from fem_reference.geometry.fibres import fibre_field
+
+INNER = 20.0  # radius of the ring [mm]
+X = np.array([1.0, 0.0, 0.0])
+
+
+def _prism() -> TetMesh:
+    """A prism of 14 x 10 x 60 mm along z."""
+    return shapes.box((5, 4, 12), (14.0, 10.0, 60.0))
+
+
+def _ring() -> TetMesh:
+    """A quarter ring of 10 x 14 mm about the y axis, from z = 0 ("bottom") to x = 0 ("top")."""
+    bar = shapes.box((4, 5, 24), (10.0, 14.0, np.pi / 2))
+    across, along, angle = bar.points.T
+    points = np.stack([(INNER + across) * np.cos(angle), along, (INNER + across) * np.sin(angle)], axis=1)
+    return TetMesh(points, bar.tets, bar.facets)
+
+
+def _cylinder() -> TetMesh:
+    """A cylinder of radius 8 mm and length 50 mm along z."""
+    bar = shapes.box((6, 6, 12), (2.0, 2.0, 50.0))
+    flat = bar.points[:, :2] - 1
+    shrink = np.abs(flat).max(axis=1) / np.maximum(np.linalg.norm(flat, axis=1), 1e-12)
+    return TetMesh(np.column_stack([8 * flat * shrink[:, None], bar.points[:, 2]]), bar.tets, bar.facets)
+
+
+def _lines(mesh: TetMesh, count: int = 12, pennation: float = 0.0, towards: np.ndarray = X) -> Polylines:
+    field = fibre_field(mesh, "bottom", "top")
+    return mapped(field, contours(field, 20, towards), count, pennation)
+
+
+def test_fibres_of_a_prism_are_straight_and_as_long() -> None:
+    lines = _lines(_prism())
+    assert_allclose(lines.lengths(), 60, rtol=1e-6)
+    assert_allclose(np.ptp(lines.points.reshape(12, 40, 3)[:, :, :2], axis=1), 0, atol=1e-3)
+
+
+def test_fibres_of_a_cylinder_are_straight_and_as_long() -> None:
+    """The rims of its sections are polygons whose corners differ a little from section to section."""
+    lines = _lines(_cylinder())
+    assert_allclose(lines.lengths(), 50, rtol=5e-4)
+    assert_allclose(np.ptp(lines.points.reshape(12, 40, 3)[:, :, :2], axis=1), 0, atol=0.3)
+
+
+def test_a_prism_has_the_template_to_scale() -> None:
+    """A rectangle is mapped linearly: the places in the square are the places in the prism, over its sides."""
+    lines = _lines(_prism())
+    assert_allclose(lines.points.reshape(12, 40, 3)[:, 20, :2] / [14, 10], template(12, 0.0)[:, 0, :2], atol=1e-5)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 25.0])
+def test_pennate_fibres_have_the_angle_asked_for(degrees: float) -> None:
+    lines = _lines(_prism(), pennation=np.radians(degrees)).points.reshape(12, 40, 3)
+    along = lines[:, -1] - lines[:, 0]
+    assert_allclose(np.degrees(np.arctan2(along[:, 0], along[:, 2])), degrees, atol=1e-3)
+    assert_allclose(along[:, 1], 0, atol=1e-3)
+    ends = lines[:, [0, -1]]
+    at_ends = np.isclose(ends[:, :, 2], [0, 60], atol=1e-4) | np.isclose(ends[:, :, 0], [0, 14], atol=1e-3)
+    assert at_ends.all(), "each end is on an attachment or on a side"
+
+
+def test_fibres_of_a_bent_bar_are_arcs_as_long() -> None:
+    lines = _lines(_ring())
+    radii = np.linalg.norm(lines.points[:, [0, 2]], axis=1).reshape(12, 40)
+    assert np.ptp(radii, axis=1).max() < 0.15
+    assert_allclose(lines.lengths(), radii.mean(axis=1) * np.pi / 2, rtol=3e-3)
+    assert embed(_ring(), lines.points).outside.max() < 0.05  # the sagitta of the ring's facets
+
+
+@pytest.mark.parametrize("pennation", [0.0, 0.3])
+def test_turned_scaled_and_renumbered_meshes_give_the_same_fibres(pennation: float) -> None:
+    ring, rng = _ring(), np.random.default_rng(3)
+    turn, order = Rotation.random(rng=rng), rng.permutation(len(ring.points))
+    number = np.argsort(order)
+    moved = TetMesh(
+        3 * turn.apply(ring.points)[order] + 100,
+        number[ring.tets],
+        {name: number[facets] for name, facets in ring.facets.items()},
+    )
+    lines, found = (_lines(mesh, pennation=pennation, towards=to) for mesh, to in [(ring, X), (moved, turn.apply(X))])
+    assert_allclose(found.points, 3 * turn.apply(lines.points) + 100, atol=1e-3)
+
+
+def test_fibres_of_a_template_never_cross() -> None:
+    points = _lines(_ring(), 30).points.reshape(30, 40, 3)
+    apart = np.linalg.norm(points[:, None] - points[None], axis=3).min(axis=2) + 9 * np.eye(30)
+    assert apart.min() > 0.2
+
+
+def test_what_cannot_be_is_an_error() -> None:
+    field = fibre_field(_prism(), "bottom", "top")
+    with pytest.raises(InputError, match=r"kohout_kukacka\.towards.*one across it"):
+        contours(field, 20, np.array([0.0, 0.0, 1.0]))
