@@ -109,9 +109,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
     lengths = np.linalg.norm(d, axis=1)
     if not (lengths > 0).all():
         edge = int(np.argmin(lengths > 0))
-        raise InputError(
-            "points", f"vertices {s[edge]} and {t[edge]} of one edge at one place", "edges with a direction"
-        )
+        got = f"vertices {s[edge]} and {t[edge]} of one edge at one place"
+        raise InputError("points", got, "edges with a direction")
     d /= lengths[:, None]
     dj = d[:, :, None] * d[:, None, :]
     rows, columns = np.concatenate([s, t, s, t]), np.concatenate([t, s, s, t])

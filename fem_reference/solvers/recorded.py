@@ -90,13 +90,8 @@ def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candid
     said = about(folder)
     plain = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name)
     name = said.name or plain.lstrip(".")[:100] or "candidate"
-    table = {
-        "name": name,
-        "solver": "recorded",
-        "folder": str(folder),
-        "unit": said.unit or "mm" if unit is None else unit,
-    }
-    return parse(Candidate, table, place)
+    unit = said.unit or "mm" if unit is None else unit
+    return parse(Candidate, {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit}, place)
 
 
 def _about_file(path: Path) -> Path:
@@ -120,9 +115,8 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
     missing = [str(number) for number in setup.frames if number not in sequence]
     if missing:
         there = f"{min(sequence)} to {max(sequence)}" if sequence else "none"
-        raise InputError(
-            source, f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})", "every frame wanted"
-        )
+        got = f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})"
+        raise InputError(source, got, "every frame wanted")
     frames = []
     for number in setup.frames:
         entry = sequence[number]
@@ -131,7 +125,10 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
         frames.append(Frame(number, positions))
         if number == setup.frames[0]:
             _check_at_rest(surface.place, number, positions, setup.surface)
-        _check_size(surface.place, positions, setup.surface)
+        size = diagonal(positions) / diagonal(setup.surface.points)
+        if not size >= SMALLEST:
+            got = f"a surface of {size:.2g} times the size at rest"
+            raise InputError(surface.place, got, "one unit of length in all frames")
     for frame in frames:
         sink(frame)
     cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
@@ -145,13 +142,6 @@ def _checked_about(settings: RecordedSettings) -> About:
         place = f"{_about_file(Path(settings.folder))}: unit"
         raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {settings.unit:g} mm")
     return said
-
-
-def _check_size(place: str, positions: Floats, rest: Surface) -> None:
-    """InputError where a frame is so small that it must be in another unit than the first."""
-    size = diagonal(positions) / diagonal(rest.points)
-    if not size >= SMALLEST:
-        raise InputError(place, f"a surface of {size:.2g} times the size at rest", "one unit of length in all frames")
 
 
 def _source(path: Path) -> Path:

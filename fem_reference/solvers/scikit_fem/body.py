@@ -52,9 +52,8 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     if body.contact is not None:
         raise InputError("contact", "bones", "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
-        raise InputError(
-            "prescribed", "springs at points of a skin", "springs on facets, as this solver knows no others"
-        )
+        want = "springs on facets, as this solver knows no others"
+        raise InputError("prescribed", "springs at points of a skin", want)
     if body.start is not None:
         raise InputError("start", "a state other than rest", "rest, from which this solver begins")
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]

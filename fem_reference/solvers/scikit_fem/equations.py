@@ -143,9 +143,8 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
     """The virtual work of a load: minus its traction, along the displacement."""
     assert points.normals is not None
     state = _state(jets, None, load.amount(frame))
-    return _along_displacement(
-        [-_jet(entry, jets[0]) for entry in load.traction(state, list(points.normals.reshape(-1, 3).T))]
-    )
+    tractions = load.traction(state, list(points.normals.reshape(-1, 3).T))
+    return _along_displacement([-_jet(entry, jets[0]) for entry in tractions])
 
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
