@@ -16,6 +16,7 @@ from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.problems import muscle
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies.decompositions import DecompositionError, of_decompositions
 
 log = logging.getLogger(__name__)
 
@@ -80,11 +81,13 @@ class Estimation:
     heights: tuple[HeightError, ...]
     fits: tuple[FitError, ...]
     missing: dict[str, str]
+    decompositions: tuple[DecompositionError, ...] = ()
 
 
 def estimate(cases: Iterable[MuscleCase]) -> Estimation:
     """All techniques on all cases."""
     curves, heights, fits, missing = list[CurveError](), list[HeightError](), list[FitError](), dict[str, str]()
+    decompositions = list[DecompositionError]()
     for case in cases:
         log.info("%s: curves, heights and surfaces", case.name)
         try:
@@ -95,7 +98,8 @@ def estimate(cases: Iterable[MuscleCase]) -> Estimation:
         curves += of_fibres(case.name, muscle.build(case, setup).fibres)
         heights += of_attachments(case.name, setup)
         fits += of_surface(case.name, setup)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing)
+        decompositions += of_decompositions(case, setup)
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions))
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
