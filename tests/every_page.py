@@ -20,12 +20,12 @@ from fem_reference.report import (
     study_page,
     verify_page,
 )
-from tests.assessment import test_versions
+from tests.assessment import test_estimation, test_versions
 from tests.report import entries as made_entries
 from tests.report import examples as scalar_examples
 from tests.report import test_study_page
-from tests.studies import test_estimation, test_table_5_1
 from tests.studies import test_omissions as test_effects_verb
+from tests.studies import test_table_5_1
 from tests.studies import test_true_errors as test_claims
 
 KINDS = (

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fem_reference.assessment.estimation import CurveError, Estimation
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.io.texts import finite
 from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.studies.estimation import CurveError, Estimation
 
 # Control points in the plane, as in the report's Figure 3.1.
 _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])

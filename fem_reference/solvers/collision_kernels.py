@@ -126,6 +126,7 @@ class CollidingBone:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
+        self.known_to = math.inf if self.grid is None else self.grid.margin  # beyond it a grid is coarse
         self.asked_at, self.clear = np.array(rest), np.where(free, 0.0, np.inf)
         distance, _ = self._sample(self.asked_at)
         self.allowed = np.minimum(distance, gap)
@@ -141,7 +142,7 @@ class CollidingBone:
         distance, gradient = self._sample(places)
         allowed = self.allowed[vertices]
         self.asked_at[vertices] = places
-        self.clear[vertices] = _SURE * np.maximum(self._known(distance) - allowed, 0)
+        self.clear[vertices] = _SURE * np.maximum(np.minimum(distance, self.known_to) - allowed, 0)
         length = np.linalg.norm(gradient, axis=1, keepdims=True)
         away = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0)
         return Contacts(vertices, distance - allowed, away @ self.pose[:3, :3].T)
@@ -155,10 +156,6 @@ class CollidingBone:
             return sample(self.coefficients, np.array(self.grid.origin), self.grid.spacing, places)
         found = self.bone.shape.sample(places)
         return found.distance, found.gradient
-
-    def _known(self, distance: Floats) -> Floats:
-        """Not more than what the distance is for sure: beyond the margin of a grid it is coarse."""
-        return distance if self.grid is None else np.minimum(distance, self.grid.margin)
 
 
 def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: float) -> list[CollidingBone]:

@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.2 and 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length and no surface, and is judged on that length alone. A shortest path takes the
-shorter path round: where ends turn past what is opposite, it changes sides.
+Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
+points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on its length alone. A
+shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
+from fem_reference.solvers.common.hill import HillSettings
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.solvers.common.state_checks import Trouble
 
@@ -52,12 +53,13 @@ class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight path would cross it.
+    line goes around, from one fixed point to the next, where the straight path would cross it. ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
     sphere: SphereOn | None = None
     cylinder: CylinderOn | None = None
+    hill: HillSettings | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -111,6 +113,11 @@ class Shortest:
         self.cost = {"seconds_compile": 0.0}
         self.inside: Trouble | None = None
         self.found = Frame(problem.frames[0], None)
+        first = _paths(self.wrap, self.lines.at(problem.frames[0]), problem.frames[0])[0].lengths
+        self.hill = settings.hill
+        self.muscles = (
+            () if self.hill is None else self.hill.muscles(first.reshape(len(self.lines.fixed), -1).sum(axis=1))
+        )
 
     def move(self, number: int) -> None:
         """Find the paths at a frame."""
@@ -118,7 +125,16 @@ class Shortest:
         if self.wrap is not None and (inside := _inside(self.wrap, fixed, number)):
             self.inside = Trouble("diverged", inside)
         else:
-            self.found = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+            self.found, lengths = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+            self.found.scalars.update(self._forces(lengths))
+
+    def _forces(self, lengths: Floats) -> dict[str, float]:
+        """The force of all lines [N] of these lengths (k,) [mm], and the mean length of their fibres over the optimal one."""
+        if self.hill is None:
+            return {}
+        pairs = zip(self.muscles, lengths.tolist(), strict=True)
+        found = np.array([muscle.static(length, self.hill.activation) for muscle, length in pairs])
+        return {"muscle_force": float(found[:, 0].sum()), "fibre_length_mean": float(found[:, 1].mean())}
 
     def trouble(self) -> Trouble | None:
         """The trouble with a fixed point inside the obstacle; None without."""
@@ -137,7 +153,7 @@ class Shortest:
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
-    return each(Shortest(problem, settings), problem.frames, sink)
+    return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
@@ -155,13 +171,15 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     return lines, wrap
 
 
-def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> Frame:
-    """The lines with as many points as the fibres have; ``lost_by_chords_max`` [mm], how much shorter than its path one is so."""
+def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> tuple[Frame, Floats]:
+    """The lines with as many points as the fibres have, and the lengths of their paths (k,) [mm]; ``lost_by_chords_max`` [mm]: the
+    greatest length that chords cut off a path.
+    """
     paths, pose = _paths(wrap, fixed, number)
     points = apply(pose, paths.at(lines.part, lines.share))
     lengths = paths.lengths.reshape(len(fixed), -1).sum(axis=1)
     lost = float((lengths - fibres.lengths(points)).max())
-    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost})
+    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost}), lengths
 
 
 def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats]:
@@ -219,9 +237,8 @@ def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
 def _along(points: Floats, places: list[float]) -> Floats:
     """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return np.column_stack(
-        [np.interp(np.array(places) * travelled[-1], travelled, points[:, axis]) for axis in range(3)]
-    )
+    wanted = np.array(places) * travelled[-1]
+    return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
@@ -238,12 +255,8 @@ def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
         raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
-    away = np.array(
-        [
-            np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)
-            for attached in problem.attached
-        ]
-    )
+    ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
+    away = [np.linalg.norm(points[:, None] - end, axis=2).min(axis=1) for end in ends]
     found = [_index(problem.bones, attached.bone.name, place) for attached in problem.attached]
     return np.array(found)[np.argmin(away, axis=0)]
 

@@ -73,21 +73,15 @@ def network_of(mesh: TetMesh, settings: MassSpringSettings) -> Network:
     pairs = np.concatenate([mesh.tets[:, list(pair)] for pair in combinations(range(4), 2)])
     springs = np.unique(np.sort(pairs, axis=1), axis=0)
     mass = settings.density * float(tet_volumes(mesh.points, mesh.tets).sum()) / len(mesh.points)
+    damping = report_damping(mass, settings.stiffness) if settings.damping == _REPORT else settings.damping or 0.0
     return Network(
         masses=np.full(len(mesh.points), mass),
         springs=springs,
         lengths=np.linalg.norm(mesh.points[springs[:, 1]] - mesh.points[springs[:, 0]], axis=1),
         stiffness=settings.stiffness,
-        damping=_coefficient(settings, mass),
+        damping=float(damping),
         gravity=np.array(settings.gravity or (0.0, 0.0, 0.0)),
     )
-
-
-def _coefficient(settings: MassSpringSettings, mass: float) -> float:
-    """The damping coefficient c [N s/mm] of settings."""
-    if settings.damping is None:
-        return 0.0
-    return settings.damping if isinstance(settings.damping, float) else report_damping(mass, settings.stiffness)
 
 
 def report_damping(mass: float, stiffness: float) -> float:
@@ -126,9 +120,8 @@ class MassSpringModel:
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
         self.fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *self.attached]))
         skin = boundary(mesh.tets)[0]
-        still = np.union1d(
-            self.fixed, np.setdiff1d(np.arange(len(mesh.points)), skin)
-        )  # what is inside collides with nothing
+        # What is inside collides with nothing.
+        still = np.union1d(self.fixed, np.setdiff1d(np.arange(len(mesh.points)), skin))
         self.bones = [] if collision is None else colliding_bones(problem.bones, mesh.points, still, collision.gap)
         self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
         self.points = problem.begin(mesh.points)

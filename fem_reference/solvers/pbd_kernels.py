@@ -1,9 +1,14 @@
 """The three constraints of position based dynamics, compiled: value, gradient and projection. Report section 5.5.3.
 
-A projection moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
+A projection (``project_``) moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
 ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``, one constraint after the other in the order of the
 arrays (Gauss-Seidel), so that the result depends on that order. ``stiffness`` is the share of C that one projection
 takes away, to first order. Arrays should be writable and C-contiguous: each other kind is compiled for anew.
+
+In extended position based dynamics (``pull_``; Macklin, Mueller and Chentanez 2016, DOI 10.1145/2994258.2994272) C stands for the
+energy ``C^2 / (2 alpha)`` with a compliance alpha. A projection moves points by ``dp_i = w_i grad_i C dl``, ``dl = -(C + a l) /
+(sum_j w_j |grad_j C|^2 + a)`` with w in 1/t and ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l, which begins
+a time step as 0: ``l / dt^2`` is the constraint's force. The path to the solution depends on the order, the solution does not.
 """
 
 import math
@@ -204,3 +209,68 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
             move(points, j, step * w2, g2)
             move(points, k, step * w3, g3)
             move(points, m, step * w4, g4)
+
+
+@compiled
+def multiplier_step(value: float, weight: float, softness: float, multiplier: float) -> float:
+    """``dl`` of a constraint of this ``value``; 0 where nothing could move."""
+    if weight > 0:
+        return -(value + softness * multiplier) / (weight + softness)
+    return 0.0
+
+
+@compiled
+def pull_distances(
+    points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, softness: Floats, multipliers: Floats
+) -> None:
+    """One projection of the length of each of the ``edges`` (e, 2), ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
+    for h in range(len(edges)):
+        i, j = edges[h, 0], edges[h, 1]
+        length, direction = distance(at(points, i), at(points, j))
+        weight = inverse_masses[i] + inverse_masses[j]
+        step = multiplier_step(length - rest[h], weight, softness[h], multipliers[h])
+        multipliers[h] += step
+        move(points, i, step * inverse_masses[i], direction)
+        move(points, j, -step * inverse_masses[j], direction)
+
+
+@compiled
+def pull_volume(
+    points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, softness: float, multiplier: float
+) -> float:
+    """One projection of six times the volume inside ``triangles`` (m, 3), ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
+
+    Returns the multiplier after it.
+    """
+    value, gradient = volume(points, triangles)
+    weight = 0.0
+    for i in range(len(points)):
+        slope = at(gradient, i)
+        weight += inverse_masses[i] * dot(slope, slope)
+    step = multiplier_step(value - rest, weight, softness, multiplier)
+    for i in range(len(points)):
+        move(points, i, step * inverse_masses[i], at(gradient, i))
+    return multiplier + step
+
+
+@compiled
+def pull_dihedrals(
+    points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, softness: Floats, multipliers: Floats
+) -> None:
+    """One projection of the angle of each of the ``hinges`` (e, 4), ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
+
+    As in position based dynamics, no projection turns a pair by more than ``LARGEST_TURN``.
+    """
+    for h in range(len(hinges)):
+        i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
+        angle, g1, g2, g3, g4 = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))
+        w1, w2, w3, w4 = inverse_masses[i], inverse_masses[j], inverse_masses[k], inverse_masses[m]
+        weight = w1 * dot(g1, g1) + w2 * dot(g2, g2) + w3 * dot(g3, g3) + w4 * dot(g4, g4)
+        step = multiplier_step(angle - rest[h], weight, softness[h], multipliers[h])
+        if abs(step) * weight > LARGEST_TURN:
+            step = math.copysign(LARGEST_TURN, step) / weight
+        multipliers[h] += step
+        move(points, i, step * w1, g1)
+        move(points, j, step * w2, g2)
+        move(points, k, step * w3, g3)
+        move(points, m, step * w4, g4)

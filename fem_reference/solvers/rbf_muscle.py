@@ -50,7 +50,7 @@ class RbfSettings(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class _Cloud:
+class Cloud:
     """Nodes (k, 3) that stay as rigid as possible: first the centres, then the points of attachments, which are given. ``one`` and
     ``other`` (e,) are the ends of edges; ``factor`` is that of the matrix of the free nodes.
     """
@@ -63,7 +63,8 @@ class _Cloud:
     factor: tuple[Floats, bool]
 
     @staticmethod
-    def of(centres: Floats, given: Floats) -> "_Cloud":
+    def of(centres: Floats, given: Floats) -> "Cloud":
+        """The cloud of free ``centres`` (m, 3) and ``given`` points (k - m, 3), each with its nearest neighbours."""
         nodes, free = np.concatenate([centres, given]), len(centres)
         _, near = cKDTree(nodes).query(nodes, k=min(_AROUND + 1, len(nodes)))
         pairs = np.stack([np.repeat(np.arange(len(nodes)), near.shape[1] - 1), near[:, 1:].ravel()])
@@ -71,7 +72,13 @@ class _Cloud:
         laplacian = np.zeros((len(nodes), len(nodes)))
         laplacian[one, other] = -1.0
         np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
-        return _Cloud(nodes, free, one, other, laplacian, cho_factor(laplacian[:free, :free]))
+        try:
+            factor = cho_factor(laplacian[:free, :free])
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "gaussians", f"{free} of which some are tied to no attachment", "more, or fewer"
+            ) from error
+        return Cloud(nodes, free, one, other, laplacian, factor)
 
     def gradients(self, now: Floats) -> Floats:
         """Sums (k, 3, 3) of edge now times edge at rest, around each node."""
@@ -117,7 +124,7 @@ class RbfMuscle:
         self.handles = [
             entry.vertices[farthest_points(rest.points[entry.vertices], _HANDLES)] for entry in setup.attached
         ]
-        self.cloud = _Cloud.of(self.fitted.centres, rest.points[np.concatenate(self.handles)])
+        self.cloud = Cloud.of(self.fitted.centres, rest.points[np.concatenate(self.handles)])
         away, nearest = cKDTree(rest.points[vertices]).query(rest.points)
         self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
         self.along = _along(setup, self.cloud.nodes)

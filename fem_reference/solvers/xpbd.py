@@ -38,8 +38,7 @@ from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bon
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import hinges_of
-from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
-from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
+from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedrals, pull_distances, pull_volume, volume
 
 
 class XpbdCollision(Record):

@@ -1,13 +1,13 @@
 """Decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fem_reference.assessment.estimation import DecompositionError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
 from fem_reference.geometry.fibres import NearestLine
 from fem_reference.geometry.signed_distance import signed_distances
@@ -21,22 +21,6 @@ NEAR = 0.2  # two fibres that are nearer [mm] between their ends cross
 _ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
 _ALONG = 400  # points at which a fibre is looked at
 _OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
-
-
-@dataclass(frozen=True)
-class DecompositionError:
-    """Fibres of a ``source`` beside those of ``against``: the angle between them [degrees], median and 95th percentile, the
-    ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
-    """
-
-    case: str
-    source: str
-    against: str
-    median: float
-    most: float
-    length: float
-    outside: float
-    crossings: int
 
 
 def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionError]:

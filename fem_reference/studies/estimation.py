@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fem_reference.assessment.estimation import CurveError, DecompositionError, Estimation, FitError, HeightError
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, enclosed_volume
 from fem_reference.geometry import radial_basis
@@ -16,7 +16,7 @@ from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.problems import muscle
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies.decompositions import DecompositionError, of_decompositions
+from fem_reference.studies.decompositions import of_decompositions
 
 log = logging.getLogger(__name__)
 
@@ -27,67 +27,10 @@ _ALONG = 1000  # points at which a curve is looked at
 _POLYNOMIAL = 3  # terms of a plane
 
 
-@dataclass(frozen=True)
-class CurveError:
-    """A ``technique`` on the fibres of a case, of each of which ``known`` points were given: distances [mm] of the others from the
-    curve, root mean square and ``greatest``.
-    """
-
-    case: str
-    technique: str
-    known: int
-    rms: float
-    greatest: float
-
-
-@dataclass(frozen=True)
-class HeightError:
-    """Heights of an attached area over its plane by Gaussians with ``centres`` of a ``choice``, fitted to every other vertex: error
-    [mm] at the others, and the condition number of the matrix.
-    """
-
-    case: str
-    attachment: str
-    choice: str
-    centres: int
-    rms: float
-    condition: float
-
-
-@dataclass(frozen=True)
-class FitError:
-    """The surface of a muscle with so many ``vertices`` by so many ``gaussians``: distances of vertices [mm], root mean square and
-    ``greatest``, and its volume over the true one.
-    """
-
-    case: str
-    vertices: int
-    gaussians: int
-    rms: float
-    greatest: float
-    volume: float
-
-    @property
-    def fewer(self) -> float:
-        """The numbers of the vertices over those of the Gaussians."""
-        return 3 * self.vertices / (4 * self.gaussians)
-
-
-@dataclass(frozen=True)
-class Estimation:
-    """The errors of all techniques; ``missing``: by case, the reason of omission."""
-
-    curves: tuple[CurveError, ...]
-    heights: tuple[HeightError, ...]
-    fits: tuple[FitError, ...]
-    missing: dict[str, str]
-    decompositions: tuple[DecompositionError, ...] = ()
-
-
 def estimate(cases: Iterable[MuscleCase]) -> Estimation:
     """All techniques on all cases."""
     curves, heights, fits, missing = list[CurveError](), list[HeightError](), list[FitError](), dict[str, str]()
-    decompositions = list[DecompositionError]()
+    decompositions: list[DecompositionError] = []
     for case in cases:
         log.info("%s: curves, heights and surfaces", case.name)
         try:

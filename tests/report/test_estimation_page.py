@@ -4,7 +4,7 @@ import json
 
 from fem_reference import report
 from fem_reference.report import estimation_page
-from tests.studies.test_estimation import found
+from tests.assessment.test_estimation import found
 
 
 def test_the_page_and_its_numbers(tmp_path) -> None:

@@ -24,6 +24,7 @@ from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
+from fem_reference.solvers.common.hill import Hill
 from fem_reference.studies import execution, workflow
 
 pytestmark = pytest.mark.slow
@@ -342,3 +343,28 @@ def test_the_ends_are_attached_by_the_bones_of_the_nearest_attachments() -> None
     spare = Bone("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))
     assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)
+
+
+HILL = {"max_force": "500 N", "fibre_share": 0.4, "pennation": "20 deg"}
+
+
+def test_lines_pull_as_hills_muscles_of_their_lengths() -> None:
+    """Two lines of 30 mm share the force; as one of them becomes longer it pulls more than one that slackens."""
+    pull = Translation((0, 0, 1), (0.0, 10.0), (0.0, 6.0))
+    given = bar(pull)
+    _, frames = solved(given, hill=HILL)
+    alone = parse(
+        Hill,
+        {"max_force": "500 N", "optimal_length": "12 mm", "slack_length": f"{30 - 12 * math.cos(math.radians(20))} mm"},
+        "",
+    )
+    alone = alone.model_copy(update={"pennation": math.radians(20)})
+    for frame, length in zip(frames, (30.0, 33.0, 36.0), strict=True):
+        force, fibre = alone.static(length, 1.0)
+        assert frame.scalars["muscle_force"] == pytest.approx(force, rel=1e-9)
+        assert frame.scalars["fibre_length_mean"] == pytest.approx(fibre, rel=1e-9)
+    _, tired = solved(given, hill=HILL | {"activation": 0.2})
+    assert tired[1].scalars["muscle_force"] < 0.5 * frames[1].scalars["muscle_force"]
+    _, slack = solved(bar(Translation((0, 0, -1), (0.0, 10.0), (0.0, 20.0))), hill=HILL)
+    assert slack[-1].scalars["muscle_force"] == 0
+    assert "muscle_force" not in solved(given)[1][0].scalars

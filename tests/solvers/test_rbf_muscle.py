@@ -82,3 +82,10 @@ def test_a_muscle_without_attachments_is_refused() -> None:
     setup = Setup(muscle(), (), (), (0, 1), None)
     with pytest.raises(InputError, match="without attachments"):
         run(setup)
+
+
+def test_gaussians_that_nothing_holds_are_refused() -> None:
+    """Two clouds of ten nodes far from each other, of which one has the points that are given."""
+    cloud = np.random.default_rng(3).normal(size=(10, 3))
+    with pytest.raises(InputError, match="tied to no attachment"):
+        rbf_muscle.Cloud.of(np.concatenate([cloud, cloud + 1000]), cloud[:4] + 0.1)

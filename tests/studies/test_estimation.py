@@ -5,25 +5,8 @@ import pytest
 import shapes
 
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.studies import estimation
-from fem_reference.studies.decompositions import DecompositionError
-from fem_reference.studies.estimation import CurveError, Estimation, FitError, HeightError
-
-
-def found() -> Estimation:
-    """Errors of two cases, made up."""
-    curves = [
-        CurveError(case, name, known, rms / known, 2 * rms / known)
-        for case in ("one", "other")
-        for known in (4, 6)
-        for rms, name in enumerate(TECHNIQUES, start=1)
-    ]
-    heights = [HeightError("one", "origin", choice, 9, 0.1, 1e5) for choice in ("grid", "Halton")]
-    fits = [FitError("one", 900, count, 10 / count, 20 / count, 0.99) for count in (10, 30)]
-    beside = DecompositionError("one", "CHMD", "file", 3.14, 12.0, 1.05, 0.02, 4)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), {"lost": "why it was"}, (beside,))
 
 
 def fibres(*lines: np.ndarray) -> Polylines:

@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -56,7 +55,7 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
     if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
         return refused(model, frames[0], sink, why)
     sink(model.frame(frames[0]))
-    return _go(model, range(frames[0] + 1, frames[-1] + 1), frames, sink)
+    return each(model, range(frames[0] + 1, frames[-1] + 1), frames, sink)
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
@@ -65,9 +64,8 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
     seen = np.linspace(setup.frames[0], setup.frames[-1], count + 1)
-    bones = [
-        bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()
-    ]  # the loop reports the others
+    # The loop reports bones whose poses are not finite.
+    bones = [bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()]
     things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
     found = skipped(things, seen.tolist(), diagonal(points))
     if found is None:
@@ -80,18 +78,14 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
     )
 
 
-def each(model: FrameModel, frames: tuple[int, ...], sink: Sink) -> Outcome:
-    """Take ``model``, whose states do not depend on earlier ones, to ``frames`` only, the first like all others."""
-    return _go(model, frames, frames, sink)
-
-
 def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
     """The outcome of a loop that does not start, with the reason ``why``; ``sink`` gets the ``first`` frame, which is rest."""
     sink(model.frame(first))
     return Outcome(why.status, why.sentence, _begun(model))
 
 
-def _go(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
+def each(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
+    """Take ``model`` to the frame ``numbers`` one after the other; ``sink`` gets those that are ``wanted``."""
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -154,10 +148,12 @@ class MovingSurface:
     cost: dict[str, float] = field(default_factory=dict)
     points: Floats = field(init=False)
     kept: Floats = field(init=False)
+    checks: tuple[StateCheck, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         self.points = self.setup.begin(self.setup.surface.points)
         self.kept = np.zeros(self.points.shape)
+        self.checks = surface_checks(self.setup.surface, self.setup.attached_vertices)
         free = len(self.points) - len(np.unique(self.setup.attached_vertices))
         self.cost |= {"unknowns": 3.0 * free, "projections": 0.0}
 
@@ -168,11 +164,7 @@ class MovingSurface:
 
     def trouble(self) -> Trouble | None:
         """The trouble with the surface; None without."""
-        return first_trouble(self._checks, self.points)
-
-    @cached_property
-    def _checks(self) -> tuple[StateCheck, ...]:
-        return surface_checks(self.setup.surface, self.setup.attached_vertices)
+        return first_trouble(self.checks, self.points)
 
     def frame(self, number: int) -> Frame:
         """The surface."""

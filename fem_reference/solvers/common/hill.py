@@ -109,6 +109,32 @@ class Hill(Record):
         return np.array(forces), np.array(lengths)
 
 
+class HillSettings(Record):
+    """Lines as Hill-type muscles with tendons, in equilibrium at each frame (5.1): all alike, and together of a ``max_force``.
+
+    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just slack;
+    ``pennation``: their angle; ``activation``: from 0 to 1.
+    """
+
+    max_force: Force
+    fibre_share: Annotated[float, Field(gt=0, lt=1)]
+    pennation: Annotated[Angle, Field(ge=0, lt=1.2)] = 0.0
+    activation: Annotated[float, Field(ge=0, le=1)] = 1.0
+
+    def muscles(self, lengths: Floats) -> tuple[Hill, ...]:
+        """The muscle of each line (k,) of these ``lengths`` [mm] at the first frame."""
+        share, angle = self.fibre_share, self.pennation
+        return tuple(
+            Hill.model_construct(
+                max_force=self.max_force / len(lengths),
+                optimal_length=share * length,
+                slack_length=(1 - share * math.cos(angle)) * length,
+                pennation=angle,
+            )
+            for length in lengths.tolist()
+        )
+
+
 def active(fibre: float) -> float:
     """The greatest contractile force [F0] at a ``fibre`` length [l0]: 1 at the optimal one."""
     return math.exp(-((fibre - 1) ** 2) / _WIDTH)

@@ -6,8 +6,6 @@ Pressure block: the mass matrix over local stiffness, which is spectrally equiva
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
-from weakref import proxy
-
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem.petsc import interpolation_matrix
@@ -24,6 +22,34 @@ _MOST = 200  # iterations; also the excess over a fresh preconditioner that is s
 _STALE = 15
 
 
+class _Blocks:
+    """The block triangular preconditioner: ``cycle`` of the displacements, ``mass`` of the pressures, and their ``coupling``.
+
+    PETSc's solver keeps it, so it must not refer to that solver: neither would ever be freed.
+    """
+
+    cycle: PETSc.PC
+    mass: PETSc.PC
+    coupling: PETSc.Mat
+
+    def __init__(self, sets: list[PETSc.IS]) -> None:
+        self.sets = sets
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
+        forces, volumes = (x.getSubVector(names) for names in self.sets)
+        moves, pressures = (y.getSubVector(names) for names in self.sets)
+        self.mass.apply(volumes, pressures)
+        pressures.scale(-1.0)
+        remaining = forces.duplicate()
+        self.coupling.mult(pressures, remaining)
+        remaining.aypx(-1.0, forces)
+        self.cycle.apply(remaining, moves)
+        for names, given, found in zip(self.sets, (forces, volumes), (moves, pressures), strict=True):
+            x.restoreSubVector(names, given)
+            y.restoreSubVector(names, found)
+
+
 class Multigrid:
     """Solves with the matrix of a ``system`` on one rank, whose element is quadratic and has a pressure."""
 
@@ -38,7 +64,8 @@ class Multigrid:
         self.coarse, self.fixed = self._interpolation(displaced.astype(np.int64))
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.getPC().setType("python")
-        self.krylov.getPC().setPythonContext(proxy(self))  # which owns it
+        self.blocks = _Blocks(self.sets)
+        self.krylov.getPC().setPythonContext(self.blocks)
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
@@ -64,24 +91,10 @@ class Multigrid:
     def _renew(self) -> None:
         """Build the preconditioner of the present matrix."""
         with self.spent.on("factorisation"):
-            stiff, self.coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
-            self.cycle, self.mass = self._cycle(stiff), self._mass()
+            stiff, self.blocks.coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
+            self.blocks.cycle, self.blocks.mass = self._cycle(stiff), self._mass()
         self.spent.counts["factorisations"] += 1
         self.stale = False
-
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
-        forces, volumes = (x.getSubVector(names) for names in self.sets)
-        moves, pressures = (y.getSubVector(names) for names in self.sets)
-        self.mass.apply(volumes, pressures)
-        pressures.scale(-1.0)
-        remaining = forces.duplicate()
-        self.coupling.mult(pressures, remaining)
-        remaining.aypx(-1.0, forces)
-        self.cycle.apply(remaining, moves)
-        for names, given, found in zip(self.sets, (forces, volumes), (moves, pressures), strict=True):
-            x.restoreSubVector(names, given)
-            y.restoreSubVector(names, found)
 
     def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
         """One cycle between the two elements."""

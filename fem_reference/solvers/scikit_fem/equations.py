@@ -14,18 +14,8 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
-# By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.
-QUADRATURE_DEGREE = {
-    "P1": 2,
-    "P1/P1": 2,
-    "P2": 4,
-    "P2/P0": 4,
-    "P2/P1": 4,
-    "Q1": 3,
-    "Q2": 5,
-    "Q1/P0": 3,
-    "Q2/Q1": 5,
-}
+# By the displacement of an element: exact on a straight cell with a law of second degree in the strain.
+QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 Acting = list[tuple[Effect, float]]
@@ -46,7 +36,7 @@ class Equations:
     """The equations of ``body`` in the unknowns of ``space``."""
 
     def __init__(self, body: Body, element: str, quadrature_degree: int | None) -> None:
-        self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element])
+        self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element[:2]])
         inside = self.space.inside
         if body.fibre is not None and any("fibre" in effect.needs for effect in body.effects):
             inside = inside.with_fibre(body.fibre)
@@ -154,7 +144,7 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
     assert points.normals is not None
     state = _state(jets, None, load.amount(frame))
     return _along_displacement(
-        [-_jet(entry, jets[0]) for entry in load.traction(state, _columns(points.normals.reshape(-1, 3)))]
+        [-_jet(entry, jets[0]) for entry in load.traction(state, list(points.normals.reshape(-1, 3).T))]
     )
 
 
@@ -183,15 +173,10 @@ def _state(entries: Sequence[Any], fibre: Floats | None, amount: float = 1.0) ->
         F=[entries[0:3], entries[3:6], entries[6:9]],
         displacement=entries[DISPLACEMENT],
         pressure=entries[PRESSURE],
-        fibre=None if fibre is None else _columns(fibre),
+        fibre=None if fibre is None else list(np.moveaxis(fibre, -1, 0)),
         amount=amount,
         functions=JET_FUNCTIONS,
     )
-
-
-def _columns(vectors: Floats) -> list[Floats]:
-    """The components of vectors (..., 3), each at all points."""
-    return [vectors[..., i] for i in range(3)]
 
 
 def _jet(value: Any, like: Jet) -> Jet:

@@ -35,10 +35,12 @@ NUMBERS = (2, 4, 6)
 SETUP = Setup(NO_SURFACE, (), (), NUMBERS, None)
 
 
-@pytest.mark.parametrize(("loop", "given", "visited"), [(follow, SETUP, [3, 4, 5, 6]), (each, NUMBERS, [2, 4, 6])])
+@pytest.mark.parametrize(
+    ("loop", "given", "visited"), [(follow, (SETUP,), [3, 4, 5, 6]), (each, (NUMBERS, NUMBERS), [2, 4, 6])]
+)
 def test_wanted_frames_are_given_on_and_every_iteration_counts(loop, given, visited) -> None:
     model, frames = Counting(), list[Frame]()
-    outcome = loop(model, given, frames.append)
+    outcome = loop(model, *given, frames.append)
     assert model.visited == visited
     assert [frame.number for frame in frames] == [2, 4, 6]
     assert (outcome.status, outcome.message) == ("out of steps", "nearly")

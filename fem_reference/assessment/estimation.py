@@ -1,0 +1,76 @@
+"""Errors of the report's estimation techniques (chapter 3, section 7.1), as records."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CurveError:
+    """A ``technique`` on the fibres of a case, of each of which ``known`` points were given: distances [mm] of the others from the
+    curve, root mean square and ``greatest``.
+    """
+
+    case: str
+    technique: str
+    known: int
+    rms: float
+    greatest: float
+
+
+@dataclass(frozen=True)
+class HeightError:
+    """Heights of an attached area over its plane by Gaussians with ``centres`` of a ``choice``, fitted to every other vertex: error
+    [mm] at the others, and the condition number of the matrix.
+    """
+
+    case: str
+    attachment: str
+    choice: str
+    centres: int
+    rms: float
+    condition: float
+
+
+@dataclass(frozen=True)
+class FitError:
+    """The surface of a muscle with so many ``vertices`` by so many ``gaussians``: distances of vertices [mm], root mean square and
+    ``greatest``, and its volume over the true one.
+    """
+
+    case: str
+    vertices: int
+    gaussians: int
+    rms: float
+    greatest: float
+    volume: float
+
+    @property
+    def fewer(self) -> float:
+        """The numbers of the vertices over those of the Gaussians."""
+        return 3 * self.vertices / (4 * self.gaussians)
+
+
+@dataclass(frozen=True)
+class DecompositionError:
+    """Fibres of a ``source`` beside those of ``against``: the angle between them [degrees], median and 95th percentile, the
+    ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
+    """
+
+    case: str
+    source: str
+    against: str
+    median: float
+    most: float
+    length: float
+    outside: float
+    crossings: int
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """The errors of all techniques; ``missing``: by case, the reason of omission."""
+
+    curves: tuple[CurveError, ...]
+    heights: tuple[HeightError, ...]
+    fits: tuple[FitError, ...]
+    missing: dict[str, str]
+    decompositions: tuple[DecompositionError, ...] = ()
