@@ -50,6 +50,22 @@ class FitError:
 
 
 @dataclass(frozen=True)
+class DecompositionError:
+    """Fibres of a ``source`` beside those of ``against``: the angle between them [degrees], median and 95th percentile, the
+    ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
+    """
+
+    case: str
+    source: str
+    against: str
+    median: float
+    most: float
+    length: float
+    outside: float
+    crossings: int
+
+
+@dataclass(frozen=True)
 class Estimation:
     """The errors of all techniques; ``missing``: by case, the reason of omission."""
 
@@ -57,3 +73,4 @@ class Estimation:
     heights: tuple[HeightError, ...]
     fits: tuple[FitError, ...]
     missing: dict[str, str]
+    decompositions: tuple[DecompositionError, ...] = ()

@@ -1,8 +1,9 @@
 """Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
 
 Theirs has isocontours on the surface; here each is the rim of a section of the Laplace field in tetrahedra, and the points inside
-come from a harmonic map of that section, so that they are in the muscle. One difference is left: a muscle with several heads is
-followed along its greatest section only.
+come from a harmonic map of that section. On the sections the points are in the muscle, between them lines may leave it where it
+bends. A muscle with several heads is followed along its greatest section only; where the outline of sections changes much from one
+to the next, as in gluteus maximus, lines turn sharply, more so with more sections.
 """
 
 from dataclasses import dataclass

@@ -119,12 +119,12 @@ class NearestLine:
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """Unit vectors (n, 3) at rest ``points`` (n, 3)."""
-        middles, directions = self._segments
+        middles, directions = self.segments
         _, nearest = cKDTree(middles).query(points)
         return np.asarray(directions[nearest])
 
     @cached_property
-    def _segments(self) -> tuple[Floats, Floats]:
+    def segments(self) -> tuple[Floats, Floats]:
         """The middle of each segment (k, 3) and its direction (k, 3)."""
         lines = self.lines
         starts = np.setdiff1d(np.arange(len(lines.points) - 1), lines.offsets[1:] - 1)

@@ -16,7 +16,9 @@ from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, 
 from fem_reference.geometry.patches import draped, fan
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.geometry.surface_fibres import between
 from fem_reference.io import files
+from fem_reference.scenes.fibres import PolylineFile
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
@@ -159,10 +161,17 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    given = case.fibres.polylines
-    if given is None:
-        return None
-    return files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
+    """The lines in the file of a case, or between those in its files."""
+    if (given := case.fibres.polylines) is not None:
+        return _read(case, given, "fibres.polylines")
+    if (asked := case.fibres.chmd) is not None:
+        heads = [_read(case, head, f"fibres.chmd.heads[{i}]") for i, head in enumerate(asked.heads)]
+        return between(heads, asked.count)
+    return None
+
+
+def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
+    return files.read_polylines(case.file(given.file, f"{key}.file"), given.unit)
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:

@@ -45,7 +45,9 @@ def said(found: Estimation) -> str:
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    rows = {name: [asdict(one) for one in getattr(found, name)] for name in ("curves", "heights", "fits")}
+    rows = {
+        name: [asdict(one) for one in getattr(found, name)] for name in ("curves", "heights", "fits", "decompositions")
+    }
     for one in rows["heights"]:
         one["condition"] = finite(one["condition"])
     return {**rows, "missing": found.missing}

@@ -52,12 +52,20 @@ class KohoutKukacka(Record):
         return self
 
 
+class Chmd(Record):
+    """Fibres between those on the muscle's surface: three or more around each of its ``heads``, by file."""
+
+    count: int = Field(gt=0, le=1000)
+    heads: tuple[PolylineFile, ...] = Field(min_length=1)
+
+
 class Fibres(Record):
-    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced`` and ``kohout_kukacka``."""
+    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``."""
 
     polylines: PolylineFile | None = None
     traced: Traced | None = None
     kohout_kukacka: KohoutKukacka | None = None
+    chmd: Chmd | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

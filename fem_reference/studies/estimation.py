@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem_reference.assessment.estimation import CurveError, Estimation, FitError, HeightError
+from fem_reference.assessment.estimation import CurveError, DecompositionError, Estimation, FitError, HeightError
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, enclosed_volume
 from fem_reference.geometry import radial_basis
@@ -16,6 +16,7 @@ from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.problems import muscle
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies.decompositions import of_decompositions
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +30,7 @@ _POLYNOMIAL = 3  # terms of a plane
 def estimate(cases: Iterable[MuscleCase]) -> Estimation:
     """All techniques on all cases."""
     curves, heights, fits, missing = list[CurveError](), list[HeightError](), list[FitError](), dict[str, str]()
+    decompositions: list[DecompositionError] = []
     for case in cases:
         log.info("%s: curves, heights and surfaces", case.name)
         try:
@@ -39,7 +41,8 @@ def estimate(cases: Iterable[MuscleCase]) -> Estimation:
         curves += of_fibres(case.name, muscle.build(case, setup).fibres)
         heights += of_attachments(case.name, setup)
         fits += of_surface(case.name, setup)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing)
+        decompositions += of_decompositions(case, setup)
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions))
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:

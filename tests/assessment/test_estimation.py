@@ -1,6 +1,6 @@
 """Records of estimation techniques, with made-up errors for the tests of the page."""
 
-from fem_reference.assessment.estimation import CurveError, Estimation, FitError, HeightError
+from fem_reference.assessment.estimation import CurveError, DecompositionError, Estimation, FitError, HeightError
 from fem_reference.geometry.curves import TECHNIQUES
 
 
@@ -14,7 +14,8 @@ def found() -> Estimation:
     ]
     heights = [HeightError("one", "origin", choice, 9, 0.1, 1e5) for choice in ("grid", "Halton")]
     fits = [FitError("one", 900, count, 10 / count, 20 / count, 0.99) for count in (10, 30)]
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), {"lost": "why it was"})
+    beside = DecompositionError("one", "CHMD", "file", 3.14, 12.0, 1.05, 0.02, 4)
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), {"lost": "why it was"}, (beside,))
 
 
 def test_numbers_are_counted_for_vertices_and_gaussians() -> None:

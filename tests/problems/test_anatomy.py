@@ -321,3 +321,17 @@ def test_a_template_is_a_source_of_fibres(bar, degrees: int) -> None:
     assert np.degrees(np.arctan2(along[0], along[2])) == pytest.approx(degrees, abs=0.1)
     assert len(lines) == 5
     assert anatomy.lean(case, np.array([0, 0, 1.0])) == pytest.approx(np.sin(np.radians(2 * degrees)))
+
+
+def test_fibres_between_those_in_files_are_a_source(bar) -> None:
+    """Between four straight lines along the edges of the bar, no mesh is made, and nothing leans."""
+    edges = [np.array([[x, y, z] for z in (0.0, 20.0, 40.0)]) for x, y in ((1, 1), (9, 1), (9, 8), (1, 9))]
+    files.write_polylines(
+        bar / "edges.vtp", lines := Polylines(np.concatenate(edges), np.array([0, 3, 6, 9, 12])), lines.points
+    )
+    chmd = {"count": 6, "heads": ({"file": "edges.vtp", "unit": "mm"},)}
+    case = casefile.read(bar).model_copy(update={"fibres": Fibres(chmd=chmd)})
+    surface = shapes.skin(shapes.box((3, 3, 8), (10.0, 10.0, 40.0)))
+    found, _ = anatomy.fibres_of(case, surface, lambda _: pytest.fail("it was meshed"))
+    assert found.lengths() == pytest.approx(np.full(6, 40.0))
+    assert anatomy.lean(case, np.array([0, 0, 1.0])) == pytest.approx(0, abs=1e-9)

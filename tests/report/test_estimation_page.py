@@ -13,6 +13,8 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert (len(numbers["curves"]), len(numbers["heights"]), len(numbers["fits"])) == (28, 2, 2)
     assert numbers["missing"] == {"lost": "why it was"}
     assert text.count("<svg") == 3
+    assert "Decompositions into fibres" in text
+    assert numbers["decompositions"][0]["source"] == "CHMD"
     assert "why it was" in text
     assert "1e+05" in text
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.

@@ -39,3 +39,7 @@ def test_there_is_one_source(bar: Path) -> None:
         {"kohout_kukacka": PARALLEL, "traced": {"count": 1, "start": "start", "end": "end"}},
         "exactly one of",
     )
+
+
+def test_heads_are_needed(bar: Path) -> None:
+    refused(bar, "fibres", {"chmd": {"count": 3, "heads": []}}, "heads")

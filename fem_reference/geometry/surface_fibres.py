@@ -1,0 +1,90 @@
+"""Fibres inside a muscle by centripetal Catmull-Rom splines between fibres on its surface: the decomposition of Kohout and Cholt,
+CHMD (report 6.1.2), head by head.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines
+from fem_reference.geometry.curves import catmull_rom, knots
+from fem_reference.geometry.fibres import POINTS, resample
+
+_GOLDEN = np.pi * (3 - np.sqrt(5))  # from seed to seed of a sunflower [rad]
+
+
+def between(heads: Sequence[Polylines], count: int) -> Polylines:
+    """``count`` lines of 40 points between the surface fibres of each of the ``heads``, shared among them by their mean sections.
+
+    The surface fibres of a head, three or more in any order, have to run around it. Each point of a line is on a spline through two
+    opposite points of a closed spline around the head and the mean of its fibres.
+    """
+    grids = [_around(_alike(lines, i)) for i, lines in enumerate(heads)]
+    lines = [line for grid, share in zip(grids, _shares(grids, count), strict=True) for line in _inside(grid, share)]
+    return Polylines(np.concatenate(lines), np.arange(count + 1) * POINTS)
+
+
+def _alike(lines: Polylines, head: int) -> Floats:
+    """The lines of a head as (m, 40, 3), all in the direction of the first."""
+    if len(lines) < 3:
+        raise InputError(f"fibres.chmd.heads[{head}]", f"{len(lines)} surface fibres", "three or more, around the head")
+    found = np.stack([resample(lines.points[low:high]) for low, high in pairwise(lines.offsets)])
+    along = found[:, -1] - found[:, 0]
+    back = along @ along[0] < 0
+    found[back] = found[back, ::-1]
+    return found
+
+
+def _around(lines: Floats) -> Floats:
+    """The ``lines`` (m, 40, 3) in the order of their angles halfway, about the direction of their mean, the farthest first."""
+    mean = lines.mean(axis=0)
+    normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
+    arms = lines[:, POINTS // 2] - mean[POINTS // 2]
+    arms -= np.outer(arms @ normal, normal) / (normal @ normal)
+    first = arms[np.argmax(np.linalg.norm(arms, axis=1))]
+    second = np.cross(normal, first) / np.linalg.norm(normal)
+    angles = np.arctan2(arms @ second, arms @ first) % (2 * np.pi)
+    return np.asarray(lines[np.argsort(np.where(angles > 2 * np.pi - 1e-9, 0.0, angles))])
+
+
+def _shares(grids: Sequence[Floats], count: int) -> Ints:
+    """The number (len(grids),) of lines of each head, in proportion to its mean section, ``count`` in all."""
+    arms = [grid - grid.mean(axis=0) for grid in grids]
+    corners = [np.cross(arm, np.roll(arm, -1, axis=0)).sum(axis=0) for arm in arms]
+    areas = [np.linalg.norm(one, axis=1).mean() for one in corners]
+    exact = count * np.array(areas) / sum(areas)
+    shares = np.floor(exact).astype(np.int64)
+    shares[np.argsort(shares - exact, kind="stable")[: count - shares.sum()]] += 1
+    return shares
+
+
+def _inside(grid: Floats, count: int) -> list[Floats]:
+    """``count`` lines (40, 3) in a head of surface fibres ``grid`` (m, 40, 3), spread like the seeds of a sunflower."""
+    order = np.arange(count)
+    radii, turns = np.sqrt((order + 0.5) / max(count, 1)), (order * _GOLDEN / (2 * np.pi)) % 1
+    centres, found = grid.mean(axis=0), np.empty((count, POINTS, 3))
+    for k, centre in enumerate(centres):
+        rim, opposite = (_loop(grid[:, k], (turns + half) % 1) for half in (0, 0.5))
+        for i in range(count):
+            found[i, k] = _across(np.array([rim[i], centre, opposite[i]]), radii[i])
+    return [resample(line) for line in found]
+
+
+def _loop(points: Floats, turns: Floats) -> Floats:
+    """Points (n, 3) after ``turns`` (n,) of a closed spline through ``points`` (m, 3); straight where two of them meet."""
+    closed = np.concatenate([points[-2:], points, points[:3]])
+    at = turns * len(points) + 2
+    if np.linalg.norm(np.diff(closed, axis=0), axis=1).min() == 0:
+        low = at.astype(np.int64)
+        return np.asarray(closed[low] + (at - low)[:, None] * (closed[low + 1] - closed[low]))
+    return catmull_rom(closed)(np.interp(at, np.arange(len(closed)), knots(closed, 0.5)))
+
+
+def _across(points: Floats, radius: float) -> Floats:
+    """The point (3,) at a ``radius``, 1 at the first and 0 at the second, of a spline through three ``points`` (3, 3)."""
+    if np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
+        return np.asarray(points[1] + radius * (points[0] - points[1]))
+    middle = knots(points, 0.5)[1]
+    return np.asarray(catmull_rom(points)(middle * (1 - radius)))

@@ -1,0 +1,82 @@
+"""Decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings."""
+
+from collections.abc import Iterator
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fem_reference.assessment.estimation import DecompositionError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
+from fem_reference.geometry.fibres import NearestLine
+from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.problems import anatomy, muscle
+from fem_reference.problems.setup import Setup
+from fem_reference.scenes.fibres import Chmd, Fibres, KohoutKukacka, Traced
+from fem_reference.scenes.muscle import MuscleCase
+
+COUNT, CONTOURS = 20, 20
+NEAR = 0.2  # two fibres that are nearer [mm] between their ends cross
+_ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
+_ALONG = 400  # points at which a fibre is looked at
+_OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
+
+
+def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionError]:
+    """Each source of fibres of a case against the Laplace field's and, where a file has some, against those."""
+    found = {
+        name: anatomy.lines_of(one, rest.surface, partial(muscle.filled, one, rest))[0]
+        for name, one in _variants(case).items()
+    }
+    for against in ("Laplace field", "file"):
+        for source in (name for name in found if against in found and name != against):
+            yield compared(case.name, rest.surface, (source, found[source]), (against, found[against]))
+
+
+def _variants(case: MuscleCase) -> dict[str, MuscleCase]:
+    """The case with each source of fibres that it can have."""
+    ends = list(case.fibres.ends.values()) or [one.name for one in case.attachment][:2]
+    found: dict[str, Fibres] = {}
+    if len(ends) == 2:
+        start, end = ends
+        found["Laplace field"] = Fibres(traced=Traced(count=COUNT, start=start, end=end))
+        template = KohoutKukacka(count=COUNT, start=start, end=end, contours=CONTOURS, template="parallel")
+        found["Kohout and Kukacka"] = Fibres(kohout_kukacka=template)
+    if (given := case.fibres.polylines) is not None:
+        found["CHMD"] = Fibres(chmd=Chmd(count=COUNT, heads=(given,)))
+        found["file"] = case.fibres
+    return {name: case.model_copy(update={"fibres": fibres}) for name, fibres in found.items()}
+
+
+def compared(
+    case: str, surface: Surface, one: tuple[str, Polylines], other: tuple[str, Polylines]
+) -> DecompositionError:
+    """Named fibres ``one`` beside the ``other`` in the ``surface`` of a muscle."""
+    (source, lines), (against, known) = one, other
+    middles, along = NearestLine(known).segments
+    directions = NearestLine(lines)(np.zeros(len(middles), np.int64), middles)
+    angles = np.degrees(np.arccos(np.clip(np.abs(np.einsum("ij,ij->i", directions, along)), 0, 1)))
+    return DecompositionError(
+        *(case, source, against),
+        median=float(np.median(angles)),
+        most=float(np.quantile(angles, 0.95)),
+        length=float(lines.lengths().mean() / known.lengths().mean()),
+        outside=float((signed_distances(lines.points, surface) > _OUTSIDE).mean()),
+        crossings=crossings(lines),
+    )
+
+
+def crossings(lines: Polylines) -> int:
+    """The number of pairs of lines that come nearer than 0.2 mm to each other between their ends."""
+    inner = [_inner(lines.points[low:high]) for low, high in pairwise(lines.offsets)]
+    numbers: Ints = np.repeat(np.arange(len(inner)), _ALONG)
+    near = cKDTree(np.concatenate(inner)).query_pairs(NEAR, output_type="ndarray")
+    pairs = np.sort(numbers[near], axis=1)
+    return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
+
+
+def _inner(line: Floats) -> Floats:
+    """Points (400, 3) along a ``line`` (k, 3) without its ends."""
+    at = np.linspace(_ENDS, 1 - _ENDS, _ALONG) * (len(line) - 1)
+    return np.stack([np.interp(at, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)
