@@ -203,7 +203,7 @@ class Limits(NamedTuple):
         """The limits of a new baseline, from the error bars (f,) of a deviation.
 
         ``tolerance``: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest
-        value: the past is known even where the reference hardly is. ``within``: the greatest sum of a value and its bar; for a
+        value: the past is exact even where the reference is uncertain. ``within``: the greatest sum of a value and its bar; for a
         measure of the run itself, which has no bar, the greatest value plus its tolerance.
         """
         least = 10.0 * 10.0 ** -PLACES[one.unit]

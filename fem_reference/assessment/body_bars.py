@@ -17,7 +17,7 @@ LEFT = 2.0
 @dataclass(frozen=True, eq=False)
 class BodyBars:
     """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
-    [mm], ``energy`` (f,) [N mm], and by name of each constraint or obstacle the vectors ``forces`` (f,) [N] and ``moments`` (f,)
+    [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
     [N mm]; NaN where unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
     nodes; ``sharper`` describes the more accurate solution.
     """

@@ -65,7 +65,7 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
 
 def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
-    """The root mean square of the known shares of the metric ``wanted``, 0 without any."""
+    """The root mean square of the known shares of the metric ``wanted``, 0 if there are none."""
     known = [share for metric, share in shares if metric == wanted and math.isfinite(share)]
     return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
 

@@ -95,7 +95,7 @@ def doubts(reference: Run) -> list[str]:
         most = int(np.argmax(np.abs(gaps)))
         said.append(
             f"{100 * gaps[most]:.3g} % of the energy without work at frame {reference.numbers[most]}: the body jumped, or the load "
-            "steps are too large to tell (largest_step)"
+            "steps are too large to decide (largest_step)"
         )
     return said
 

@@ -56,7 +56,7 @@ class Margins:
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True where
-    on the case itself; ``nearest``: where none meets the limits, the one that misses them least.
+    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them.
     """
 
     best: Expected | None

@@ -76,7 +76,7 @@ class Judgement:
         if math.isnan(self.known):
             return "the error bar of the reference is unknown; --error-bar measures it"
         if math.isnan(self.allowed):
-            return "the baseline does not say how far from the reference is allowed; --update does, now that the error bar is known"
+            return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
         text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
         return f"{text}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"

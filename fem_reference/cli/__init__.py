@@ -86,7 +86,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError where ``--name`` is none that a page can have: what else lies beside pages has its own."""
+    """InputError where ``--name`` cannot be the name of a page: the other files beside pages have names of their own."""
     from fem_reference.report.asked import LONGEST  # what it needs may be missing, which is said below
 
     if name is not None and (

@@ -1,7 +1,7 @@
-"""The verb ``check``: a candidate against its own past and against the reference, for the pipeline of whoever writes it.
+"""The verb ``check``: a candidate against its own past and against the reference, for the author's pipeline.
 
-Where nothing can be said the exit status is 0: what the reference lacks is no fault of the change that is checked, and should
-not fail it; the text, the Markdown and the JUnit file (as skipped) say so.
+An inconclusive result has exit status 0: an uncertain reference is no fault of the change that is checked. The text, the
+Markdown and the JUnit file (as skipped) say so.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import refinement
 
-HELP = "judge a candidate by its own past and by the reference, for a pipeline"
+HELP = "judge a candidate against its own past and against the reference, for a pipeline"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     anew = "write the baseline anew from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst judgements for a pull request")
     share(parser, "--error-bar", "--ranks")
 
 

@@ -8,7 +8,7 @@ from fem_reference import solvers
 from fem_reference.cli import DONE, _parser, write_output
 from fem_reference.scenes import casefile
 
-HELP = "print what lets a shell complete verbs, options and names of cases"
+HELP = "print a script with which a shell completes verbs, options and names of cases"
 _COMPLETE = "complete"  # what shtab looks for in an action
 # Commands that complete as ``fem-reference`` does, by the name that shtab gives its function.
 _ALIASES = {

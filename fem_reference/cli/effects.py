@@ -1,4 +1,4 @@
-"""The verb ``effects``: what each effect of a case changes, and what it costs."""
+"""The verb ``effects``: the change and the cost of each effect of a case."""
 
 import argparse
 
@@ -11,7 +11,7 @@ from fem_reference.scenes import casefile
 from fem_reference.studies import omissions
 from fem_reference.studies.campaign import Workers
 
-HELP = "what leaving out each effect of a case changes and saves, for its reference and its candidates, and the page"
+HELP = "leave out each effect of a case in turn, measure the change and the time saved, and write the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The verb ``export``: a case for a solver that is not ours, or its runs for ParaView."""
+"""The verb ``export``: a case for another solver, or its runs for ParaView."""
 
 import argparse
 from pathlib import Path
@@ -18,7 +18,7 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import judging, refinement
 from fem_reference.studies.execution import Bench
 
-HELP = "write all that a solver needs which is not ours, in open formats; or runs for ParaView"
+HELP = "write all that another solver needs, in open formats; or runs for ParaView"
 PARAVIEW = "paraview"
 
 
@@ -38,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a case for a solver that is not ours, or its runs for ParaView."""
+    """Write a case for another solver, or its runs for ParaView."""
     scene = casefile.muscle(scene_of(options))
     if options.format == PARAVIEW:
         return _runs(scene, options)

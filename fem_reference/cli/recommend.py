@@ -1,4 +1,4 @@
-"""The verb ``recommend``: which solver and setting to take for an error or a time, out of what studies measured."""
+"""The verb ``recommend``: a solver and setting for an error or a time, from the results of studies."""
 
 import argparse
 import math
@@ -20,7 +20,7 @@ from fem_reference.studies.features import features
 # The notations of frames a second, and of a time for each frame.
 _RATES = ("fps", "Hz", "frames/s", "1/s")
 _PER_FRAME = re.compile(r"\s*(?:/|per)\s*frame\s*$")
-HELP = "which solver and setting to take for an error or a time, out of what studies measured"
+HELP = "recommend a solver and setting for an error or a time, from the results of studies"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

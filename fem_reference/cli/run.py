@@ -14,7 +14,7 @@ from fem_reference.report.overview import run_text
 from fem_reference.report.tables import of_run
 from fem_reference.studies.execution import Bench
 
-HELP = "solve a case and judge what it expects of the reference"
+HELP = "solve a case and judge its expectations of the reference"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

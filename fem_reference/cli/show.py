@@ -1,4 +1,4 @@
-"""The verb ``show``: what a case is made of."""
+"""The verb ``show``: the parts of a case."""
 
 import argparse
 
@@ -7,7 +7,7 @@ from fem_reference.cli._cases import checked_bench, lines, own_candidates, scene
 from fem_reference.cli._parser import share
 from fem_reference.report.overview import case_facts
 
-HELP = "what a case is made of; with --out also its meshes for ParaView"
+HELP = "show the parts of a case; with --out write its meshes for ParaView"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -16,7 +16,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Say what a case is made of."""
+    """Print the parts of a case."""
     scene = scene_of(options)
     bench = checked_bench(scene, options, own_candidates(scene))
     facts = case_facts(scene, bench.setup())

@@ -11,7 +11,7 @@ from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part
 from fem_reference.studies.hard import records, running
 
-HELP = "run the hard cases by every solver, and write the page of who stays stable"
+HELP = "run the hard cases by every solver, and write a page that shows which solvers stay stable"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

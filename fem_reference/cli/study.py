@@ -1,4 +1,4 @@
-"""The verb ``study``: what accuracy costs in time on cases."""
+"""The verb ``study``: error against time on cases."""
 
 import argparse
 from dataclasses import replace
@@ -15,7 +15,7 @@ from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers
 
 PAGE = "study"
-HELP = "what accuracy costs in time: reference and candidates over ladders of settings, and the page"
+HELP = "measure error against time: reference and candidates over ladders of settings; write the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The verb ``validate``: all that can be known of a case before it is solved."""
+"""The verb ``validate``: all checks of a case before it is solved."""
 
 import argparse
 from typing import Any
@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, set up and mesh a case, check the settings of every solver that it chooses, and say what there is."""
+    """Read, set up and mesh a case, check the settings of every solver that it chooses, and print the facts."""
     scene = scene_of(options)
     if scene.negative_control is not None and scene.from_file:
         casefile.read(options.case, with_negative_control=True)

@@ -52,11 +52,11 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
     bones, without what is nearest to where contact is exempt; 0 where nothing is inside.
 
-    Depth is that of the surface at its vertices, and between them in triangles that do not follow the bone; or that of the
-    inside, where that reaches the middle of the bone. Beside an attachment it is what has been added since rest, and so it is on
-    an attachment in bones that move otherwise than its own, in which it is not asked. A triangle follows a bone where its corners
-    are all within the reach of ``Exemption`` of it and its edges not four times that: what is deeper between them is what a flat
-    triangle cuts off a round bone.
+    Depth is measured at the vertices of the surface, and between them in triangles that do not follow the bone; where the inside
+    of the muscle reaches the middle of the bone, it is the depth of the inside. Near an attachment only depth added since rest
+    counts. The same holds for an attachment inside a bone that moves differently from its own; inside its own bone depth is
+    not checked. A triangle follows a bone where all its corners are within the reach of ``Exemption`` and its edges are shorter
+    than four times that: any greater depth between them is the part of a round bone that a flat triangle cuts off.
 
     Depth is as exact as the field of the bone (``Grid.mean_error``, rounding counted). Volume is counted
     at random points, see ``shared``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with
@@ -132,7 +132,7 @@ def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...
 
 
 def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> bool:
-    """True where a ``bone`` has this ``name`` or moves as the one that has."""
+    """True where a ``bone`` has this ``name`` or moves like the bone of this name."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
 

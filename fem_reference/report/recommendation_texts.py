@@ -58,13 +58,13 @@ def _parts(one: Expected, unit: str, *, measured: bool) -> str:
 
 
 def _reason(one: Expected, unit: str, limit: float) -> list[str]:
-    """The bar of the truth as the reason why the nearest setting does not meet the ``limit`` of the error, where it is that."""
+    """The bar of the truth as the reason why the nearest setting does not meet the ``limit`` of the error, where that is so."""
     if one.bar >= limit:
         known = f"{number(one.bar)} {unit}"
         return [f"the truth is known no better than {known}: nothing can be said to be nearer than that"]
     if one.error > limit >= one.error - one.bar:
         within = f"{number(limit)} {unit}"
-        return [f"without the bar it would be within the {within}: the truth is not known well enough to say so"]
+        return [f"without the bar it would be within the {within}: the error bar of the truth is too large to decide"]
     return []
 
 

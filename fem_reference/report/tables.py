@@ -25,8 +25,8 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
     with the inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest`` the
-    change from rest of every run; ``error_bars`` how well the reference is known and ``rankings`` whom that separates, empty
-    without any.
+    change from rest of every run; ``error_bars`` the error bars of the reference and ``rankings`` the solvers that they separate,
+    both empty without bars.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -74,7 +74,7 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
-    """The error bars of the reference, none without any."""
+    """The error bars of the reference, if there are any."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
 
 

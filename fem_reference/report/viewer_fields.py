@@ -104,7 +104,7 @@ class Fields:
         return {name: [float(f"{_top([frame]):.4g}") for frame in values] for name, values in own.items()}
 
     def bars(self) -> dict[str, list[float | None]]:
-        """The error bar of the greatest distance by quantity and frame; nothing without any."""
+        """The error bar of the greatest distance by quantity and frame; empty without bars."""
         known = self.comparison.error_bars
         found: dict[str, list[float | None]] = {}
         if known is None:

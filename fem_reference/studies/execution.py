@@ -91,8 +91,8 @@ class Bench[C: Case]:
         return settings
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what
-        is ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
+        """InputError where settings of the reference, of a candidate of the case (except frames that are made later) or of the
+        ``chosen`` solvers do not suit the case. The problem made of the case is checked only when it is solved.
         """
         named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
         wanted = [(self.scene.reference, "reference"), *chosen]
@@ -145,7 +145,7 @@ class Bench[C: Case]:
         return None if run is None else self._checked(run)
 
     def _made(self, wanted: Wanted) -> Run:
-        """The run, solved now, by one process at a time; what is wrong with the input shows before anything is written."""
+        """The run, solved now, by one process at a time; errors of the input are raised before anything is written."""
         wanted.offer.require(wanted.settings)
         if wanted.choice == self.scene.reference:
             self.check()

@@ -20,13 +20,13 @@ from fem_reference.io import files
 from fem_reference.io.texts import toml_text
 from fem_reference.scenes import casefile
 
-# The units that are guessed among: those of LENGTH_UNITS that scanners and modellers write.
+# The units among which a guess is made: those of LENGTH_UNITS that scanners and modellers write.
 _GUESSED = ("mm", "cm", "m", "in")
-# So long are muscles and bones [mm]: what is shorter or longer in a unit is not in that.
+# The lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# No muscle is further from a bone that it is attached to than this share of its length; else they were scaled or moved apart.
+# A muscle's greatest distance from a bone it is attached to, as a share of its length; beyond it they were scaled or moved apart.
 _APART = 0.5
-# Attached are so many of the vertices, those nearest to a bone; fewer where two attachments would share some.
+# The share of vertices, those nearest to a bone, that are attached; less where two attachments would share some.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
 _LONGEST = 60  # characters of what is written of a name that a scene cannot have, or that a file cannot

@@ -130,7 +130,7 @@ def _wholes(case: MuscleCase) -> list[Trial]:
 
 
 def _warm_up(case: MuscleCase, store: Path) -> None:
-    """Solve the first frames with each candidate and keep nothing: what is measured later is compiled already."""
+    """Solve the first frames with each candidate and keep nothing, so that later measurements find compiled code."""
     bench = shared_bench(case, store)
     for trial in _wholes(case)[1:]:
         if solvers.takes_effects(trial.choice.solver):

@@ -22,6 +22,6 @@ def facts(comparison: Comparison) -> dict[str, Any]:
 
 
 def _model_change(bar: ErrorBar) -> float | None:
-    """The greatest change by another model over the frames that it reached, None without any."""
+    """The greatest change by another model over the frames that it reached, None if it reached none."""
     reached = np.zeros(0) if bar.model is None else bar.model[np.isfinite(bar.model)]
     return float(reached.max()) if len(reached) else None

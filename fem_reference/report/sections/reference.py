@@ -20,13 +20,13 @@ def facts(_: Comparison) -> dict[str, Any]:
 
 
 def greatest(run: Run, scalar: str) -> float:
-    """The greatest value of a scalar over the frames that have one, NaN without any."""
+    """The greatest value of a scalar over the frames that have one, NaN if no frame has."""
     values = run.scalars[scalar]
     return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
 
 def gap(run: Run) -> float:
-    """The energy gap that is farthest from 0 [%], NaN without any."""
+    """The energy gap that is farthest from 0 [%], NaN if there is none."""
     values = run.scalars["energy_gap"]
     return 100 * float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else math.nan
 
