@@ -137,7 +137,7 @@ def test_without_error_bars_the_past_is_judged_and_the_truth_is_not(tmp_path) ->
     # What is said of the run itself is known without them.
     assert asked(check, "within", "penetration.deepest").word == "pass"
     known = current(known=bars())
-    assert "--update does" in asked(checked(path, known), "within", "surface_deviation.rms").why
+    assert "--update adds it" in asked(checked(path, known), "within", "surface_deviation.rms").why
     baseline.update(path, known)
     assert checked(path, known).word == "pass"
 
