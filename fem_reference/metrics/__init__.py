@@ -19,7 +19,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.problems.setup import Bone, Setup
+from fem_reference.problems.setup import Bone, Joint, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
@@ -115,7 +115,7 @@ class Worst:
 class MeasurementContext:
     """The common context of all measurements of a case: ``areas`` (n,) [mm2] around the surface's vertices at rest, the ``fibres``
     at rest, the ``extension`` of a surface's displacement to their points, ``travel`` [mm], the greatest displacement of the
-    reference's surface over its frames, the ``bones``, and the part ``exempt`` from contact with them.
+    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, and the ``joints``.
     """
 
     areas: Floats
@@ -124,10 +124,16 @@ class MeasurementContext:
     travel: float
     bones: tuple[Bone, ...]
     exempt: Exemption
+    joints: tuple[Joint, ...] = ()
 
     @classmethod
     def of(
-        cls, reference: Run, fibres: Polylines, bones: tuple[Bone, ...], exempt: Exemption | None = None
+        cls,
+        reference: Run,
+        fibres: Polylines,
+        bones: tuple[Bone, ...],
+        exempt: Exemption | None = None,
+        joints: tuple[Joint, ...] = (),
     ) -> "MeasurementContext":
         """The measurement context of a reference run; nothing is exempt by default."""
         rest = reference.surface
@@ -138,6 +144,7 @@ class MeasurementContext:
             travel=float(np.nanmax(np.linalg.norm(reference.positions - rest.points, axis=2))),
             bones=bones,
             exempt=Exemption.of(rest) if exempt is None else exempt,
+            joints=joints,
         )
 
 
@@ -167,7 +174,7 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
         raise InputError(
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
         )
-    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
+    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
 
 
 class Metric(Protocol):

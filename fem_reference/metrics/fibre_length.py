@@ -44,9 +44,15 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
     And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
     """
-    lengths = _direct if _carries(run, context) and _carries(reference, context) else _extended
-    longer = lengths(run, context) - lengths(reference, context)
+    found, expected = both_lengths(run, reference, context)
+    longer = found - expected
     return _statistics(longer, "") + _statistics(100 * longer / context.fibres.lengths(), "_percent")
+
+
+def both_lengths(run: Run, reference: Run, context: MeasurementContext) -> tuple[Floats, Floats]:
+    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured alike."""
+    lengths = _direct if _carries(run, context) and _carries(reference, context) else _extended
+    return lengths(run, context), lengths(reference, context)
 
 
 def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:

@@ -52,6 +52,7 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
+from fem_reference.problems.joints import joints_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
@@ -126,7 +127,8 @@ def setup(case: MuscleCase) -> Setup:
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
     bones = tuple(_body(case, i, surface) for i in range(len(case.bone)))
-    return Setup(surface, bones, _attached(case, surface, bones), case.frames.numbers, case.frames.interval)
+    attached, joints = _attached(case, surface, bones), joints_of(case, bones)
+    return Setup(surface, bones, attached, case.frames.numbers, case.frames.interval, joints=joints)
 
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
@@ -154,6 +156,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
         skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
         attached_skins=spring_skins(rest, mesh, apart),
+        joints=rest.joints,
     )
 
 

@@ -55,6 +55,7 @@ class FieldProblem:
     muscle: ClassVar[None] = None
     bones: ClassVar[tuple[()]] = ()
     exempt: ClassVar[None] = None
+    joints: ClassVar[tuple[()]] = ()
 
     @property
     def field(self) -> "FieldProblem":

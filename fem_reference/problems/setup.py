@@ -1,6 +1,6 @@
 """Muscles before they are meshed: the surface, the bones that it is attached to and touches, and the frames wanted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -60,6 +60,24 @@ class Bone:
 
 
 @dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint that a ``bone`` turns in, about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm], right-handed.
+
+    ``angle_of``: its angle [rad] at a frame number, 0 at rest.
+    """
+
+    name: str
+    bone: Bone
+    axis: Floats
+    centre: Floats
+    angle_of: Callable[[float], float]
+
+    def angles(self, frames: Sequence[float]) -> Floats:
+        """The angles (f,) [rad] at frame numbers."""
+        return np.array([self.angle_of(frame) for frame in frames])
+
+
+@dataclass(frozen=True, eq=False)
 class AttachedVertices:
     """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
 
@@ -73,7 +91,7 @@ class AttachedVertices:
 class Setup:
     """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
     frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the
-    first frame, by its rest positions (n, 3), where that is not at rest.
+    first frame, by its rest positions (n, 3), where that is not at rest; ``joints``, about whose axes bones turn.
     """
 
     surface: Surface
@@ -82,6 +100,7 @@ class Setup:
     frames: tuple[int, ...]
     interval: float | None
     start: Callable[[Floats], Floats] | None = field(default=None, kw_only=True)
+    joints: tuple[Joint, ...] = field(default=(), kw_only=True)
 
     task: ClassVar[Task] = "solve"
     exact: ClassVar[None] = None  # no solution of a muscle is known as a formula

@@ -1,12 +1,16 @@
 """The contents of run.json as a record, read strictly: a damaged file is refused as a whole."""
 
 import json
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Name, Record
 from fem_reference.io import files, texts
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
@@ -83,3 +87,19 @@ def amend(folder: Path, **changes: Any) -> None:
     place = folder / "run.json"
     stored = texts.read_json(place, "a run")
     files.write_text(place, json.dumps(stored | changes, indent=1, allow_nan=False))
+
+
+def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
+    """The components of a ``vector`` (3,) as scalars of a frame."""
+    return {f"{name}_{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
+
+
+def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Floats:
+    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError where ``name`` has none."""
+    keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
+    if not set(keys) <= set(scalars):
+        known = ", ".join(key[len(kind) : -2] for key in scalars if key.startswith(kind) and key.endswith("_x"))
+        raise InputError(
+            "bone", f'"{name}"', f"one of {known}" if known else "a run of the reference: no force is known"
+        )
+    return np.stack([scalars[key] for key in keys], axis=1)

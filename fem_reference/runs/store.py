@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
@@ -26,7 +27,7 @@ from fem_reference.io import files, texts
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.contents import Contents, Status, frame_file
+from fem_reference.runs.contents import Contents, Status, frame_file, scalar_vectors
 from fem_reference.runs.states import FIELD, VALUES, NodalField, NodalState, read_field
 from fem_reference.scenes.case import Part
 
@@ -144,6 +145,14 @@ class Run:
         """The scalar field at the vertices (f, n)."""
         return self.values[:, : len(self.points)]
 
+    def force(self, bone: str) -> Floats:
+        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError where none is known."""
+        return scalar_vectors(self.scalars, "force_on_", bone)
+
+    def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:
+        """The moment (f, 3) [N mm] of that force about the point ``centre`` (3,) [mm]."""
+        return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(np.asarray(centre, float), self.force(bone))
+
     def _repr_html_(self) -> str:
         """The run as notebooks display it."""
         known = ("seconds", "newton_iterations", "unknowns")
@@ -154,9 +163,8 @@ class Run:
             "frames": f"{len(self.numbers)}, from {self.numbers[0]} to {self.numbers[-1]}",
             "vertices": len(self.points),
             "cost": ", ".join(f"{name} {value:.4g}" for name, value in cost.items()) or "not known",
-            "stored in": self.folder or "nowhere",
         }
-        return fact_table(f"run {self.name}", facts)
+        return fact_table(f"run {self.name}", facts | {"stored in": self.folder or "nowhere"})
 
 
 def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:

@@ -222,6 +222,8 @@ def _check_names(case: MuscleCase) -> None:
     check_acting(case.effects, bones, case.frames, case.place)
     _check_once([*attachments, FREE], join(case.place, "attachment"))
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
+    _check_once([joint.name for joint in case.joint], join(case.place, "joint"))
+    _check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
     _check_used(attachments, list(case.fibres.ends.items()), case.place)
     _check_forces(case)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(case.effects) if isinstance(effect, Load)]

@@ -156,6 +156,15 @@ class CaseBone(Record):
         return self
 
 
+class CaseJoint(Record):
+    """A joint: the axis, right-handed, through a ``centre`` about which a ``bone`` turns; its angle is 0 at the first frame."""
+
+    name: Name
+    bone: str
+    axis: Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))]
+    centre: Point
+
+
 class Muscle(Record):
     """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into
     eight (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of
@@ -238,6 +247,7 @@ class MuscleCase(Case):
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
     muscle: Muscle
     bone: tuple[CaseBone, ...] = Field(min_length=1)
+    joint: tuple[CaseJoint, ...] = ()
     attachment: tuple[Attachment, ...] = ()
     fibres: Fibres
     frames: Frames

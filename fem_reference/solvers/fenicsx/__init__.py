@@ -17,6 +17,7 @@ from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
@@ -110,7 +111,21 @@ def _described(problem: MuscleProblem, frame: Frame, *, is_first: bool) -> Frame
     pulls = {f"force_{name}": float(np.linalg.norm(force)) for name, force in frame.forces.items()}
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
+        pulls |= _on_bones(problem, kind, vectors)
     return replace(frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame))
+
+
+def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
+    """The components of the ``kind``, force or moment, of the muscle on each bone: minus the ``vectors`` (3,) on the muscle by its
+    attachments and by contact.
+    """
+    found = dict[str, float]()
+    for bone in problem.bones:
+        by = [vectors[one.attachment] for one in problem.attached if one.bone.name == bone.name]
+        by += [vectors[bone.name]] if problem.contact is not None and bone.name in vectors else []
+        if by:
+            found |= vector_scalars(f"{kind}_on_{bone.name}", -np.sum(by, axis=0))
+    return found
 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:

@@ -1,0 +1,45 @@
+"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
+
+A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
+Virtual work binds moment and energy: where nothing is dissipated, the moment is minus the slope of the stored energy in the angle. A run
+without forces, as those of most fast solvers, has none of these.
+"""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.metrics.moment_arm import turning
+from fem_reference.problems.setup import Joint
+from fem_reference.runs.store import Run
+
+STATISTICS = {
+    "moment": Statistic("N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26}),
+    "force": Statistic(
+        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27}
+    ),
+}
+OF, AGAINST = "lines", "reference"
+
+
+def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
+    """The differences of ``moment`` [N mm] and ``force`` [N] from those of the reference; NaN in a frame in which no joint turns alone."""
+    joints = [joint for joint in context.joints if _has_force(run, joint)]
+    # The rest state of a run, which has no force, is the standard for its change from rest.
+    if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
+        return ()
+    which, found = turning(joints, context, run.numbers), np.full((2, len(run.numbers)), np.nan)
+    for i, joint in enumerate(joints):
+        expected = 0.0 if reference.solver == "rest" else _values(reference, joint)
+        found[:, which == i] = (_values(run, joint) - expected)[:, which == i]
+    return measures("joint_moment", dict(zip(STATISTICS, found, strict=True)))
+
+
+def _has_force(run: Run, joint: Joint) -> bool:
+    return f"force_on_{joint.bone.name}_x" in run.scalars
+
+
+def _values(run: Run, joint: Joint) -> Floats:
+    """Moment and force by frame (2, f)."""
+    moment, force = run.moment(joint.bone.name, joint.centre), run.force(joint.bone.name)
+    return np.array([moment @ joint.axis, np.linalg.norm(force, axis=1)])

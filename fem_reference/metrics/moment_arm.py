@@ -1,0 +1,92 @@
+"""Moment arms of the fibres about the joint that turns, by tendon excursion: ``-dl/dtheta`` (An et al. 1984).
+
+``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive where the muscle shortens with a
+growing angle, as in OpenSim. The slope is that of the parabola through three frames, off by terms of second order in their angles.
+A frame in which the joint rests has the slope of the frames nearest in time. Where more than one bone moves, lengths do not depend
+on one angle alone, and the arm is NaN. A case without a joint has no arms.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.metrics.fibre_length import both_lengths
+from fem_reference.problems.setup import Joint
+from fem_reference.runs.store import Run
+
+_TITLE = "Moment arm"
+STATISTICS = {
+    "mean": Statistic("mm", _TITLE, "mean", curve="Moment arm, mean over the fibres", shown={"curve": 25}, local=True),
+    "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 35}, local=True),
+    "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 35}, local=True, lone=True),
+}
+OF, AGAINST = "lines", "reference"
+# Angles [rad] and entries of poses that are nearer than this are the same.
+_SAME = 1e-9
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
+    """Statistics over the fibres of ``r - r_reference`` [mm]: signed ``mean``, ``rms`` and greatest magnitude ``max``."""
+    if not context.joints or len(run.numbers) < 2:
+        return ()
+    found, expected = both_lengths(run, reference, context)
+    arms = excursion_arms(found - expected, context, run.numbers)
+    magnitudes = np.abs(arms)
+    values = {"mean": arms.mean(axis=1), "rms": np.sqrt(np.mean(arms**2, axis=1)), "max": magnitudes.max(axis=1)}
+    return measures("moment_arm", values, tuple(f"fibre {fibre}" for fibre in np.argmax(magnitudes, axis=1)))
+
+
+def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequence[int]) -> Floats:
+    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at frame ``numbers``; NaN where no joint turns alone."""
+    which, arms = turning(context.joints, context, numbers), np.full(lengths.shape, np.nan)
+    for frame, i in enumerate(which):
+        if i >= 0:
+            angles = context.joints[i].angles(numbers)
+            near = _near(angles, frame)
+            arms[frame] = -_weights(angles[near] - angles[frame]) @ lengths[near]
+    return arms
+
+
+def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Sequence[int]) -> Ints:
+    """The index (f,) of the joint that turns about each frame while all bones but its own rest; -1 where there is none."""
+    poses = np.array([[bone.pose(number) for bone in context.bones] for number in numbers])
+    names, which = [bone.name for bone in context.bones], np.full(len(numbers), -1)
+    for i, joint in enumerate(joints):
+        others, angles = np.delete(poses, names.index(joint.bone.name), axis=1), joint.angles(numbers)
+        for frame in range(len(numbers)):
+            near = _near(angles, frame)
+            rest = np.abs(others[near] - others[frame]).max(initial=0.0) <= _SAME
+            if len(near) > 1 and rest and which[frame] < 0:
+                which[frame] = i
+    return which
+
+
+def _near(angles: Floats, frame: int) -> list[int]:
+    """A ``frame`` and up to two others nearest in time, at three different angles on a part of the path that turns one way."""
+    before = list(_onward(angles, range(frame - 1, -1, -1), frame))
+    after = list(_onward(angles, range(frame + 1, len(angles)), frame))
+    if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:
+        return [frame, before[0], after[0]]
+    return [frame, *(before or after)]
+
+
+def _onward(angles: Floats, frames: range, start: int) -> Iterator[int]:
+    """Up to two of ``frames`` whose angles go on from that at ``start`` in one direction."""
+    direction, last, found = 0.0, start, 0
+    for frame in frames:
+        step = float(angles[frame] - angles[last])
+        if abs(step) <= _SAME:
+            continue
+        if found == 2 or step * direction < 0:
+            return
+        direction, last, found = step, frame, found + 1
+        yield frame
+
+
+def _weights(offsets: Floats) -> Floats:
+    """The weights (k,) of values at ``offsets`` (k,) for the slope at 0 of the polynomial through them."""
+    powers = np.arange(len(offsets))
+    return np.asarray(np.linalg.solve(offsets[None, :] ** powers[:, None], (powers == 1).astype(float)))
