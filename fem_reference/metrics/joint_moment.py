@@ -1,8 +1,8 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
 
-A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
-Virtual work binds moment and energy: where nothing is dissipated, the moment is minus the slope of the stored energy in the angle. A run
-without forces, as those of most fast solvers, has none of these.
+A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
+space. Virtual work binds moment and energy: where nothing is dissipated, the moment is minus the slope of the stored energy in the
+angle. A run without forces, as those of most fast solvers, has none of these.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ OF, AGAINST = "lines", "reference"
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """The differences of ``moment`` [N mm] and ``force`` [N] from those of the reference; NaN in a frame in which no joint turns alone."""
+    """The differences of ``moment`` [N mm] and ``force`` [N] from those of the reference; NaN where no joint turns alone."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):

@@ -133,8 +133,7 @@ def setup(case: MuscleCase) -> Setup:
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
     """The whole problem of a case: its setup ``rest``, filled with tetrahedra and fibres."""
-    begin = time.perf_counter()
-    contact = among(case.effects)
+    begin, contact = time.perf_counter(), among(case.effects)
     distances_known = {} if contact is None else _distances(case, rest, contact)
     mesh = filled(case, rest, case.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
@@ -269,8 +268,9 @@ def _body_of(problem: MuscleProblem) -> Body:
         name, path = entry.attachment, Follows(From(first, entry.bone.pose))
         prescribed.append(Prescribed(name, problem.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Body(cells, acting, tuple(prescribed), problem.frames, problem.fibre, interval=problem.interval)
-    body = replace(body, start=problem.start)
+    body = Body(
+        cells, acting, tuple(prescribed), problem.frames, problem.fibre, interval=problem.interval, start=problem.start
+    )
     if problem.contact is not None:
         assert problem.skin is not None  # built with the effect
         body = _among_bones(body, problem.bones, problem.skin, problem.contact)

@@ -93,8 +93,7 @@ def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
     mesh = check(mesh_of(case))
     dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
-    average = float(mesh.points[:, 1].mean()) if dimension > 1 else 0.0
-    given = _given(case, mesh)
+    average, given = float(mesh.points[:, 1].mean()) if dimension > 1 else 0.0, _given(case, mesh)
     for _ in range(refinements):
         given = np.concatenate([given, _between(mesh, given)])
         mesh = refined(mesh)

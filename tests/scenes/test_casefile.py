@@ -24,6 +24,7 @@ MUSCLE_KEYS = [
     "expect",
     "fibres",
     "frames",
+    "joint",
     "muscle",
     "negative_control",
     "proves",
