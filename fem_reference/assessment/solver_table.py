@@ -1,7 +1,8 @@
 """The kinds of solvers in Table 5.1 of the report, and the results of their solvers on scenes."""
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,8 @@ def _file() -> _File:
 @dataclass(frozen=True, eq=False)
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
-    against the reference; for the reference itself they are its error bars, none where these were not requested.
+    against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
+    parameters that somebody must give it, by where they are given; empty where that is not known.
     """
 
     kind: str
@@ -71,6 +73,7 @@ class SolverResult:
     numbers: tuple[int, ...]
     machine: str
     of_reference: bool = False
+    needs: Mapping[str, int] = field(default_factory=dict)
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
         """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
@@ -124,6 +127,11 @@ class Table:
     def names(self, kind: str) -> list[str]:
         """The solvers of a kind, in order."""
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
+
+    def needs(self, kind: str, name: str) -> Mapping[str, int]:
+        """The parameters that ``name`` needs on the scene where they are most; empty where that is not known."""
+        found = [one.needs for one in self.results if (one.kind, one.name) == (kind, name)]
+        return max(found, key=lambda needs: sum(needs.values()), default={})
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
         """The worst frames of ``name`` over all scenarios; None where it was not measured."""

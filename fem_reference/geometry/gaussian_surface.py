@@ -18,7 +18,8 @@ _INSIDE, _SAMPLES = 20_000, 1500
 _ROUNDS, _STEPS = 6, 8
 # The least and the greatest radius, over the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
-_PROJECTIONS = 12
+# Steps of Newton's method, and where they end: the longest, over the least radius.
+_PROJECTIONS, _THERE = 12, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,10 @@ class GaussianSurface:
             level, gradient, _ = self.level(points)
             squares = np.maximum((gradient**2).sum(axis=1), np.finfo(float).tiny)
             step = ((levels - level) / squares)[:, None] * gradient
-            points = points + step * np.minimum(1, longest / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
+            sizes = np.linalg.norm(step, axis=1)
+            points = points + step * np.minimum(1, longest / np.maximum(sizes, 1e-300))[:, None]
+            if sizes.max(initial=0.0) < _THERE * longest:
+                break
         return points
 
 

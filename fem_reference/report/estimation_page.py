@@ -8,12 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.estimation import CurveError, Estimation
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
+from fem_reference.geometry.gaussian_surface import GaussianSurface
 from fem_reference.io.texts import finite
 from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 
 # Control points in the plane, as in the report's Figure 3.1.
+# Distances of two Gaussians in their radii: from 2 sqrt(log 2) = 1.665 on they are two surfaces.
+_APART = (1.2, 1.6, 1.65, 1.7)
 _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])
 
 
@@ -23,7 +27,7 @@ def page(found: Estimation) -> Page:
         "found": found,
         "techniques": TECHNIQUES,
         "fibres": by_fibres(found),
-        "drawings": [_figure(), _curves(found), _fits(found)],
+        "drawings": [_figure(), _curves(found), _blobs(), _fits(found)],
     }
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
@@ -95,6 +99,32 @@ def _curves(found: Estimation) -> Drawing:
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-fibres", "Fibres: error against known points", (4.6, 4.0), draw)
+
+
+def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
+    """The level of two Gaussians of radius 1 in a plane through both: coordinates along (n,) and across (m,), and the
+    level (m, n), positive inside.
+    """
+    along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
+    x, y = np.meshgrid(along, across)
+    surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))
+    level = surface.level(np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1))[0]
+    return along, across, level.reshape(x.shape)
+
+
+def _blobs() -> Drawing:
+    """The report's Figure 7.1: two Gaussians that join."""
+
+    def draw(_: Figure, axes: Axes) -> None:
+        for i, apart in enumerate(_APART):
+            axes.contour(*two_blobs(apart), levels=[0.0], colors=[colour_of(i + 1)])
+            axes.plot([], [], color=colour_of(i + 1), label=f"{apart:g} radii apart")
+        axes.set_aspect("equal")
+        axes.set_xlabel("radii")
+        axes.set_ylabel("radii")
+        axes.legend(fontsize="x-small", loc="lower center", ncols=2)
+
+    return drawn("estimation-blobs", "Two Gaussians, one surface or two (Figure 7.1)", (4.6, 4.0), draw)
 
 
 def _fits(found: Estimation) -> Drawing:

@@ -81,6 +81,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
         worst[f"{metric}.{statistic}"] = value
     return {
         **{name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")},
+        "needs": dict(one.needs),
         "status": one.outcome.status,
         "message": one.outcome.message,
         "worst": worst,

@@ -23,7 +23,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.hill import HillSettings
-from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
 
 # An end this deep [mm] in an obstacle is on its surface, but for rounding.
@@ -52,11 +52,13 @@ class CylinderOn(Rod):
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
+    ``via``: points in the order in which a fibre passes them. ``via_count``: so many points instead, evenly
+    spread over each fibre, each on the bone of the nearer end. ``sphere`` or ``cylinder``: an obstacle that every part of a
     line goes around, from one fixed point to the next, where the straight path would cross it. ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
+    via_count: Annotated[int, Field(ge=0), Trade((0, 2, 4, 8))] = 0
     sphere: SphereOn | None = None
     cylinder: CylinderOn | None = None
     hill: HillSettings | None = None
@@ -65,6 +67,8 @@ class LineSettings(Record):
     def _check(self) -> Self:
         if self.sphere is not None and self.cylinder is not None:
             raise ValueError('at most one of "sphere", "cylinder"')
+        if self.via and self.via_count:
+            raise ValueError('at most one of "via", "via_count"')
         places = [via.at for via in self.via]
         if places != sorted(set(places)):
             raise ValueError("via-points in the order in which a fibre passes them")
@@ -108,7 +112,7 @@ class Shortest:
     advice = "a smaller radius may help"
 
     def __init__(self, problem: MuscleProblem, settings: LineSettings) -> None:
-        self.problem, self.vias = problem, len(settings.via)
+        self.problem, self.vias = problem, len(settings.via) + settings.via_count
         self.lines, self.wrap = _made(problem, settings, "line_of_action")
         self.cost = {"seconds_compile": 0.0}
         self.inside: Trouble | None = None
@@ -213,7 +217,8 @@ def _wrap(problem: MuscleProblem, settings: LineSettings, place: str) -> Wrap | 
 
 
 def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
-    fibres, places = problem.fibres, [0.0, *(via.at for via in settings.via), 1.0]
+    fibres, spread = problem.fibres, (np.arange(settings.via_count) + 0.5) / max(settings.via_count, 1)
+    places = [0.0, *(via.at for via in settings.via), *spread.tolist(), 1.0]
     vias = [_index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(settings.via)]
     parts, count = len(places) - 1, len(fibres)
     sizes = np.diff(fibres.offsets)
@@ -223,7 +228,8 @@ def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
         raise InputError(join(place, "via"), got, want)
     fixed = np.array([_along(fibres.points[low:high], places) for low, high in pairwise(fibres.offsets)])
     ends = [_nearest(problem, fixed[:, end], place) for end in (0, -1)]
-    on = np.column_stack([ends[0], *(np.full(count, via) for via in vias), ends[1]])
+    nearer = [ends[int(at > 0.5)] for at in spread]
+    on = np.column_stack([ends[0], *(np.full(count, via) for via in vias), *nearer, ends[1]])
     part, share = zip(*(_spread(int(size), places) for size in sizes), strict=True)
     return Lines(
         bones=problem.bones,

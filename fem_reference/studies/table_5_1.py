@@ -7,10 +7,12 @@ from pathlib import Path
 
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
-from fem_reference.metrics import Measure, context_of, in_tables, measure
+from fem_reference.effects.contact import among
+from fem_reference.foundations.records import Record
+from fem_reference.metrics import Measure, MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run, complete, seconds_per_frame
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import Candidate, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import each
@@ -32,6 +34,7 @@ SCENARIOS = (
 METRICS = in_tables()
 REFERENCE = "FEM"
 FOREIGN = "Yours"
+_AVOIDS = ("collision", "contact", "voxels")  # settings with which a solver avoids bones
 
 
 def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
@@ -62,13 +65,16 @@ def _on(
     reference = complete(bench.reference(), scene.numbers)
     bars = refinement.stored(reference)
     context = context_of(bench.setup(), reference)
-    results = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
+    results = [
+        _result(scene, REFERENCE, reference, bars.of_deviations if bars else (), needs(scene, scene.reference, context))
+    ]
     chosen = _chosen(scene, rows)
     for i, (kind, candidate, place) in enumerate(chosen):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))
         run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
-        results.append(_result(scene, kind, run, measure(run, reference, context, METRICS)))
-    results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
+        measures = measure(run, reference, context, METRICS)
+        results.append(_result(scene, kind, run, measures, needs(scene, candidate, context)))
+    results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {}) for run in foreign]
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
 
@@ -84,10 +90,49 @@ def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Can
     return found
 
 
-def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -> dict[str, int]:
+    """The parameters that a solver needs on a case: settings, those of the effects that it simulates, attachments, shapes of
+    bones that it avoids, and fibres. Empty for recorded frames.
+    """
+    offer = solvers.find(choice.solver, "")
+    if offer.moves == "nothing":
+        return {}
+    settings = solvers.settings(choice, choice.solver)
+    simulates = offer.check_effects is not None
+    avoids = among(case.effects) if simulates else any(getattr(settings, key, None) for key in _AVOIDS)
+    along = simulates and any("fibre" in effect.needs for effect in case.effects)
+    fibrous = offer.moves == "lines" or offer.fibres(settings) or along
+    found = {
+        "settings": stated(settings),
+        "effects": sum(map(stated, case.effects)) if simulates else 0,
+        "attachments": len(case.attachment),
+        "bones": len(case.bone) if avoids else 0,
+        "fibres": len(context.fibres) if fibrous else 0,
+    }
+    return {name: count for name, count in found.items() if count}
+
+
+def stated(record: Record) -> int:
+    """The values of a ``record`` that are required or are none of its defaults; those inside its records one by one."""
+    fields = type(record).model_fields.items()
+    given = [(field, getattr(record, key)) for key, field in fields]
+    return sum(_leaves(value) for field, value in given if field.is_required() or value != field.default)
+
+
+def _leaves(value: object) -> int:
+    if isinstance(value, tuple) and all(isinstance(one, Record) for one in value):
+        return sum(map(_leaves, value))
+    return stated(value) if isinstance(value, Record) else 1
+
+
+def _result(
+    case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...], needed: dict[str, int]
+) -> SolverResult:
     cost = run.outcome.cost
     # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
     seconds = seconds_per_frame(run) if given is None else given
     named, machine = (kind, run.name, run.solver, case.name), str(run.origin["machine"])
-    return SolverResult(*named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE)
+    return SolverResult(
+        *named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE, needs=needed
+    )

@@ -1,6 +1,10 @@
 """The page of estimation techniques, and its numbers."""
 
 import json
+import math
+
+import pytest
+from scipy.ndimage import label
 
 from fem_reference import report
 from fem_reference.report import estimation_page
@@ -12,7 +16,7 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     text, numbers = path.read_text(), json.loads((path.parent / "estimation.json").read_text())
     assert (len(numbers["curves"]), len(numbers["heights"]), len(numbers["fits"])) == (28, 2, 2)
     assert numbers["missing"] == {"lost": "why it was"}
-    assert text.count("<svg") == 3
+    assert text.count("<svg") == 4
     assert "Decompositions into fibres" in text
     assert numbers["decompositions"][0]["source"] == "CHMD"
     assert "why it was" in text
@@ -20,3 +24,10 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.
     assert estimation_page.said(found()).startswith("of curves through a few points of a fibre constant deviates least")
     assert "22 to 22 times fewer numbers" in estimation_page.said(found())
+
+
+@pytest.mark.parametrize(("apart", "surfaces"), [(1.2, 1), (1.6, 1), (1.65, 1), (1.7, 2), (1.9, 2)])
+def test_two_gaussians_part_at_a_known_distance(apart: float, surfaces: int) -> None:
+    """Half way the sum is 2 exp(-d^2 / 4), which is 1 at d = 2 sqrt(log 2)."""
+    assert (surfaces == 1) == (apart < 2 * math.sqrt(math.log(2)))
+    assert label(estimation_page.two_blobs(apart, 401)[2] > 0)[1] == surfaces

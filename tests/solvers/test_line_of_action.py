@@ -51,6 +51,24 @@ def lengths(given: MuscleProblem, frames: list[Frame]) -> np.ndarray:
     return np.array([given.fibres.lengths(frame.fibres) for frame in frames])
 
 
+def test_points_spread_evenly_are_those_that_a_scene_would_name() -> None:
+    given = bar()
+    named = solved(given, via=[{"at": 0.25, "bone": "bottom"}, {"at": 0.75, "bone": "top"}])[1]
+    spread = solved(given, via_count=2)[1]
+    # The second fibre runs from the top down, so that its points named by bone are on the wrong one.
+    assert_allclose(lengths(given, spread)[:, 0], lengths(given, named)[:, 0], rtol=1e-12)
+    assert lengths(given, spread)[2, 1] < lengths(given, named)[2, 1]
+    with pytest.raises(InputError, match='at most one of "via", "via_count"'):
+        solved(given, via=[{"at": 0.5, "bone": "top"}], via_count=1)
+
+
+def test_the_more_points_the_nearer_to_the_fibre_at_rest() -> None:
+    given = bar()
+    off = [given.fibres.lengths()[0] - lengths(given, solved(given, via_count=n)[1])[0, 0] for n in (0, 2, 4, 8)]
+    # Chords of a smooth curve are short by the square of their length.
+    assert off[0] > off[1] > 3 * off[2] > 9 * off[3] > 0
+
+
 def test_a_straight_line_is_between_ends_that_go_with_their_bones() -> None:
     given = bar()
     outcome, frames = solved(given)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from fem_reference.report import ranking_page
 from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import Candidate, SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import table_5_1
 
@@ -80,6 +81,28 @@ def test_everybody_is_measured_against_the_reference(case) -> None:
     assert facts["scenarios"][0]["travel_mm"] == pytest.approx(20.0)
     for word in ("Surface model", "still", "20", "<svg"):
         assert word in html
+
+
+def test_parameters_are_counted_from_records(case) -> None:
+    """Attachments and bones are those of the case; a default that is written out is no parameter."""
+    read = casefile.read_muscle(case)
+    context = SimpleNamespace(fibres=[None] * 7)
+
+    def count(solver: str, **settings) -> dict[str, int]:
+        return table_5_1.needs(read, SolverChoice(solver=solver, **settings), context)
+
+    ends, bones = len(read.attachment), len(read.bone)
+    assert count("pbd", **PBD) == {"settings": len(PBD), "attachments": ends}
+    collision = {"gap": "0 mm", "stiffness": 1.0}
+    assert count("pbd", **PBD, collision=collision) == {"settings": len(PBD) + 2, "attachments": ends, "bones": bones}
+    assert count("rbf_muscle", gaussians=9, iterations=10)["settings"] == 1
+    assert count("line_of_action") == {"attachments": ends, "fibres": 7}
+    via = [{"at": 0.25, "bone": "a"}, {"at": 0.75, "bone": "b"}]
+    assert count("line_of_action", via=via)["settings"] == 4
+    assert count("recorded", folder="frames") == {}
+    plain = count("fenicsx")
+    assert plain["effects"] == sum(map(table_5_1.stated, read.effects)) > 0
+    assert "settings" not in plain
 
 
 def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:

@@ -16,6 +16,7 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.campaign import Workers, carry_out, solve
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.variations import (
+    candidate_trials,
     nearest_vertices,
     on_tetrahedra,
     reference_trials,
@@ -119,6 +120,19 @@ def test_the_volume_goes_with_the_element(effects, element, values) -> None:
     for name, volume in values.items():
         assert found[name].changed.get("effect[1].name") == volume
         assert ("volume by" in found[name].value) == (volume is not None)
+
+
+def test_a_candidate_has_the_ladders_that_its_solver_declares() -> None:
+    trials = list(candidate_trials(casefile.read_muscle("hip_flexion"), {}))
+
+    def values(name: str) -> dict[str, set[str]]:
+        mine = [one for one in trials if one.name == name and one.knob]
+        return {knob: {one.value for one in mine if one.knob == knob} for knob in {one.knob for one in mine}}
+
+    # The case has 100 Gaussians and ten iterations, and straight lines; what it has already is no variation.
+    assert values("rbf_muscle") == {"gaussians": {"10", "30"}, "iterations": {"3", "30"}}
+    assert values("straight_lines") == {"via_count": {"2", "4", "8"}}
+    assert [one.name for one in trials if not one.knob].count("rbf_muscle") == 1, "that of Table 5.1 is the case's own"
 
 
 def test_a_point_with_another_element_is_the_run_that_its_keys_give(tmp_path) -> None:
