@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
 from fem_reference.problems.contact import ContactBone, ContactLaw
@@ -21,6 +21,7 @@ _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
+_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
 
 
 def check(body: Body, element: str) -> None:
@@ -258,3 +259,15 @@ def _shared(mesh: Cells, one: str, other: str) -> Floats:
     corners = np.intersect1d(mesh.facets[one], mesh.facets[other])
     both = np.divmod(np.intersect1d(edges(one), edges(other)), count)
     return np.concatenate([mesh.points[corners], mesh.points[np.stack(both, axis=1)].mean(axis=1)])
+
+
+def check_thinness(mesh: TetMesh) -> None:
+    """Raise InputError where a cell is too thin for double precision."""
+    corners = mesh.points[mesh.tets]
+    longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
+    ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))
+    worst = int(np.argmax(ratios))
+    if not ratios[worst] < _THINNEST:
+        place = f"cell {worst} at {place_of(corners[worst].mean(axis=0))}"
+        want = f"less than {_THINNEST:g}, for double precision"
+        raise InputError(place, f"{ratios[worst]:.1e} times as long as thick", want)

@@ -21,7 +21,6 @@ from fem_reference.foundations.mesh import (
     check_closed,
     check_finite,
     fingerprint,
-    place_of,
     tet_qualities,
     tet_volumes,
     triangle_areas,
@@ -43,7 +42,7 @@ from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems.anatomy import facets_under, fibres_of, pick
 from fem_reference.problems.body import Body, Cells, Prescribed
-from fem_reference.problems.checks import check_agreement
+from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
     ContactBone,
     ContactLaw,
@@ -60,8 +59,6 @@ from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.
 RELAXING = 10
-# The greatest ratio of a cell's length to its thickness: stiffnesses differ by its square, and 16 digits do not hold both.
-_THINNEST = 1e6
 
 
 def kept_meshes() -> Path | None:
@@ -257,7 +254,7 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
 
 def _body_of(problem: MuscleProblem) -> Body:
     mesh, first = problem.mesh, problem.frames[0]
-    _check_cells(mesh)
+    check_thinness(mesh)
     attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
     outer, _ = boundary(mesh.tets)
     taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
@@ -288,15 +285,3 @@ def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: Contac
     frames = body.frames if before is None else (before, *body.frames)
     posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
     return replace(body, frames=frames, contact=law, bones=posed)
-
-
-def _check_cells(mesh: TetMesh) -> None:
-    """Raise InputError where a cell is too thin for double precision."""
-    corners = mesh.points[mesh.tets]
-    longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
-    ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))
-    worst = int(np.argmax(ratios))
-    if not ratios[worst] < _THINNEST:
-        place = f"cell {worst} at {place_of(corners[worst].mean(axis=0))}"
-        want = f"less than {_THINNEST:g}, for double precision"
-        raise InputError(place, f"{ratios[worst]:.1e} times as long as thick", want)
