@@ -6,14 +6,13 @@ shortest path takes the shorter path round: where ends turn past what is opposit
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines
+from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
@@ -23,18 +22,12 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.hill import HillSettings
+from fem_reference.solvers.common.lines import Lines, Passed, Via, index, lines_of
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
 
 # An end this deep [mm] in an obstacle is on its surface, but for rounding.
 _TOUCHES = 1e-6
-
-
-class Via(Record):
-    """A point of every fibre that moves with a ``bone``: where it is at rest ``at`` this share of the fibre's length."""
-
-    at: Annotated[float, Field(gt=0, lt=1)]
-    bone: str
 
 
 class SphereOn(CaseSphere):
@@ -75,28 +68,6 @@ class LineSettings(Record):
         return self
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """A line for each of k fibres, made of p parts between fixed points, counted line by line.
-
-    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1). Point j of the fibres is on part ``part[j]`` after
-    the share ``share[j]`` of its length.
-    """
-
-    bones: tuple[Bone, ...]
-    fixed: Floats
-    on: Ints
-    part: Ints
-    share: Floats
-
-    def at(self, number: int) -> Floats:
-        """The fixed points (k, p + 1, 3) [mm] at frame ``number``."""
-        moved = np.array(self.fixed)
-        for i in np.unique(self.on):
-            moved[self.on == i] = apply(self.bones[i].pose(number), self.fixed[self.on == i])
-        return moved
-
-
 @dataclass(frozen=True)
 class Wrap:
     """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
@@ -117,7 +88,7 @@ class Shortest:
         self.cost = {"seconds_compile": 0.0}
         self.inside: Trouble | None = None
         self.found = Frame(problem.frames[0], None)
-        first = _paths(self.wrap, self.lines.at(problem.frames[0]), problem.frames[0])[0].lengths
+        first = _paths(self.wrap, self.lines.at(problem.frames[0]).points, problem.frames[0])[0].lengths
         self.hill = settings.hill
         self.muscles = (
             () if self.hill is None else self.hill.muscles(first.reshape(len(self.lines.fixed), -1).sum(axis=1))
@@ -125,11 +96,11 @@ class Shortest:
 
     def move(self, number: int) -> None:
         """Find the paths at a frame."""
-        fixed = self.lines.at(number)
-        if self.wrap is not None and (inside := _inside(self.wrap, fixed, number)):
+        passed = self.lines.at(number)
+        if self.wrap is not None and (inside := _inside(self.wrap, passed.points, number)):
             self.inside = Trouble("diverged", inside)
         else:
-            self.found, lengths = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+            self.found, lengths = _frame(passed, self.wrap, number, self.problem.fibres)
             self.found.scalars.update(self._forces(lengths))
 
     def _forces(self, lengths: Floats) -> dict[str, float]:
@@ -169,19 +140,20 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     """The lines and the obstacle; InputError below ``place`` where the case has not what they need, or a fixed point is inside the
     obstacle at the first frame.
     """
-    lines, wrap, first = _lines(problem, settings, place), _wrap(problem, settings, place), problem.frames[0]
-    if wrap is not None and (inside := _inside(wrap, lines.at(first), first)):
+    lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
+    wrap = _wrap(problem, settings, place)
+    if wrap is not None and (inside := _inside(wrap, lines.at(first).points, first)):
         raise InputError(join(place, wrap.name), inside, "an obstacle with all of them outside")
     return lines, wrap
 
 
-def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> tuple[Frame, Floats]:
+def _frame(passed: Passed, wrap: Wrap | None, number: int, fibres: Polylines) -> tuple[Frame, Floats]:
     """The lines with as many points as the fibres have, and the lengths of their paths (k,) [mm]; ``lost_by_chords_max`` [mm]: the
     greatest length that chords cut off a path.
     """
-    paths, pose = _paths(wrap, fixed, number)
-    points = apply(pose, paths.at(lines.part, lines.share))
-    lengths = paths.lengths.reshape(len(fixed), -1).sum(axis=1)
+    paths, pose = _paths(wrap, passed.points, number)
+    points = apply(pose, paths.at(passed.part, passed.share))
+    lengths = paths.lengths.reshape(len(passed.points), -1).sum(axis=1)
     lost = float((lengths - fibres.lengths(points)).max())
     return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost}), lengths
 
@@ -207,71 +179,13 @@ def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
 def _wrap(problem: MuscleProblem, settings: LineSettings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
-        bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
+        bone = problem.bones[index(problem.bones, ball.bone, join(place, "sphere.bone"))]
         return Wrap(WrappingSphere(ball.centre, ball.radius), bone, "sphere")
     if (roll := settings.cylinder) is not None:
         x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
-        bone = problem.bones[_index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
+        bone = problem.bones[index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
         return Wrap(WrappingCylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
     return None
-
-
-def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
-    fibres, spread = problem.fibres, (np.arange(settings.via_count) + 0.5) / max(settings.via_count, 1)
-    places = [0.0, *(via.at for via in settings.via), *spread.tolist(), 1.0]
-    vias = [_index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(settings.via)]
-    parts, count = len(places) - 1, len(fibres)
-    sizes = np.diff(fibres.offsets)
-    if sizes.min() <= parts:
-        got = f"fibre {sizes.argmin()} of {sizes.min()} points"
-        want = f"fibres of at least {parts + 1} points for {parts - 1} via-points"
-        raise InputError(join(place, "via"), got, want)
-    fixed = np.array([_along(fibres.points[low:high], places) for low, high in pairwise(fibres.offsets)])
-    ends = [_nearest(problem, fixed[:, end], place) for end in (0, -1)]
-    nearer = [ends[int(at > 0.5)] for at in spread]
-    on = np.column_stack([ends[0], *(np.full(count, via) for via in vias), *nearer, ends[1]])
-    part, share = zip(*(_spread(int(size), places) for size in sizes), strict=True)
-    return Lines(
-        bones=problem.bones,
-        fixed=fixed,
-        on=on,
-        part=np.concatenate([found + i * parts for i, found in enumerate(part)]),
-        share=np.concatenate(share),
-    )
-
-
-def _along(points: Floats, places: list[float]) -> Floats:
-    """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    wanted = np.array(places) * travelled[-1]
-    return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
-
-
-def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """Part and share of it (count,) for each point of a line: fixed points among them, the others evenly in between."""
-    at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
-    steps = np.arange(len(at))
-    at = np.maximum.accumulate(at - steps) + steps  # at least one point further each
-    at = np.minimum(at, count - 1 - steps[::-1])
-    part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
-    return part, (np.arange(count) - at[part]) / np.diff(at)[part]
-
-
-def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
-    """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
-    if not problem.attached:
-        raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
-    ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
-    away = [np.linalg.norm(points[:, None] - end, axis=2).min(axis=1) for end in ends]
-    found = [_index(problem.bones, attached.bone.name, place) for attached in problem.attached]
-    return np.array(found)[np.argmin(away, axis=0)]
-
-
-def _index(bodies: tuple[Bone, ...], name: str, place: str) -> int:
-    names = [body.name for body in bodies]
-    if name not in names:
-        raise InputError(place, f'"{name}"', f"one of {', '.join(names)}")
-    return names.index(name)
 
 
 SOLVES = (MuscleSolver(settings=LineSettings, solve=solve, moves="lines", check_problem=check, example={}),)

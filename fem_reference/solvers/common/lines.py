@@ -1,0 +1,178 @@
+"""Lines between bones: ends and via-points, fixed, conditional on a joint's angle or moving with it (report 5.1, Figure 5.2)."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from scipy.interpolate import PchipInterpolator
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.units import Angle, Point
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone, Joint
+
+# An angle [rad] this much out of a range is at its end, but for rounding.
+_ROUNDING = 1e-9
+
+
+class CurvePoint(Record):
+    """A ``position`` on a bone, in the frame of rest, at an ``angle`` of a joint."""
+
+    angle: Angle
+    position: Point
+
+
+class Via(Record):
+    """A point of every fibre that moves with a ``bone``: where it is at rest ``at`` this share of the fibre's length.
+
+    ``within``: the least and the greatest angle of the ``joint`` at which lines pass the point; at others they leave it out.
+    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them monotone cubics (PCHIP),
+    beyond them the nearest. ``at`` is then its place among the points alone.
+    """
+
+    at: Annotated[float, Field(gt=0, lt=1)]
+    bone: str
+    joint: str | None = None
+    within: tuple[Angle, Angle] | None = None
+    curve: tuple[CurvePoint, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.joint is None) == (self.within is not None or bool(self.curve)):
+            raise ValueError('"joint" beside "within" or "curve" and only there')
+        if self.within is not None and not self.within[0] < self.within[1]:
+            raise ValueError('"within" from an angle to a greater one')
+        angles = [point.angle for point in self.curve]
+        if len(angles) == 1 or angles != sorted(set(angles)):
+            raise ValueError('"curve" of at least two points, by growing angle')
+        return self
+
+
+@dataclass(frozen=True)
+class Guided:
+    """A via-point and the ``joint`` whose angle it depends on."""
+
+    via: Via
+    joint: Joint
+
+    def passed(self, number: int) -> bool:
+        """True where lines pass the point at frame ``number``."""
+        low, high = (-np.inf, np.inf) if self.via.within is None else self.via.within
+        return bool(low - _ROUNDING <= self.joint.angle_of(number) <= high + _ROUNDING)
+
+    def position(self, number: int) -> Floats:
+        """The point (3,) [mm] on its bone, in the frame of rest; that of a ``curve``."""
+        angles = [point.angle for point in self.via.curve]
+        angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])
+        return np.asarray(PchipInterpolator(angles, [point.position for point in self.via.curve])(angle))
+
+
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """The points (k, q + 1, 3) [mm] that k lines pass at a frame, with q parts between them, counted line by line.
+
+    Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
+    """
+
+    points: Floats
+    part: Ints
+    share: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """A line for each of k fibres of ``sizes`` (k,) points, made of p parts between fixed points, after the shares ``places``.
+
+    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1); ``guided``: those that depend on a joint.
+    """
+
+    bones: tuple[Bone, ...]
+    fixed: Floats
+    on: Ints
+    sizes: Ints
+    places: tuple[float, ...]
+    guided: dict[int, Guided]
+
+    def at(self, number: int) -> Passed:
+        """The points that the lines pass at frame ``number``."""
+        resting, moved = np.array(self.fixed), np.array(self.fixed)
+        for j, one in self.guided.items():
+            if one.via.curve:
+                resting[:, j] = one.position(number)
+        for i in np.unique(self.on):
+            moved[self.on == i] = apply(self.bones[i].pose(number), resting[self.on == i])
+        kept = [j for j in range(len(self.places)) if j not in self.guided or self.guided[j].passed(number)]
+        part, share = _layout(tuple(self.sizes.tolist()), tuple(self.places[j] for j in kept))
+        return Passed(moved[:, kept], part, share)
+
+
+def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
+    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` where it has not what they need."""
+    fibres, evenly = problem.fibres, (np.arange(spread) + 0.5) / max(spread, 1)
+    places = (0.0, *(via.at for via in vias), *evenly.tolist(), 1.0)
+    named = [index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(vias)]
+    parts, sizes = len(places) - 1, np.diff(fibres.offsets)
+    if sizes.min() <= parts:
+        got = f"fibre {sizes.argmin()} of {sizes.min()} points"
+        want = f"fibres of at least {parts + 1} points for {parts - 1} via-points"
+        raise InputError(join(place, "via"), got, want)
+    fixed = np.array([_along(fibres.points[low:high], list(places)) for low, high in pairwise(fibres.offsets)])
+    ends = [_nearest(problem, fixed[:, end], place) for end in (0, -1)]
+    nearer = [ends[int(at > 0.5)] for at in evenly]
+    on = np.column_stack([ends[0], *(np.full(len(fibres), via) for via in named), *nearer, ends[1]])
+    guided = {
+        i + 1: Guided(via, problem.joints[index(problem.joints, via.joint, join(place, f"via[{i}].joint"))])
+        for i, via in enumerate(vias)
+        if via.joint is not None
+    }
+    return Lines(problem.bones, fixed, on, sizes, places, guided)
+
+
+def _along(points: Floats, places: list[float]) -> Floats:
+    """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    wanted = np.array(places) * travelled[-1]
+    return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
+
+
+@lru_cache(maxsize=64)
+def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
+    """Part, counted line by line, and share of it for the points of lines of these ``sizes``."""
+    part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
+    return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
+
+
+def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
+    """Part and share of it (count,) for each point of a line: fixed points among them, the others evenly in between."""
+    at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
+    steps = np.arange(len(at))
+    at = np.maximum.accumulate(at - steps) + steps  # at least one point further each
+    at = np.minimum(at, count - 1 - steps[::-1])
+    part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
+    return part, (np.arange(count) - at[part]) / np.diff(at)[part]
+
+
+def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
+    """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
+    if not problem.attached:
+        raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
+    ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
+    away = [np.linalg.norm(points[:, None] - end, axis=2).min(axis=1) for end in ends]
+    found = [index(problem.bones, attached.bone.name, place) for attached in problem.attached]
+    return np.array(found)[np.argmin(away, axis=0)]
+
+
+def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) -> int:
+    """The index of what has this ``name``; InputError at ``place`` where nothing has."""
+    names = [one.name for one in named]
+    if name not in names:
+        raise InputError(
+            place, f'"{name}"', f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
+        )
+    return names.index(name)
