@@ -1,7 +1,7 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
 Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on its length alone. A
+points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
 shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
