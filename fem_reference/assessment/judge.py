@@ -24,6 +24,9 @@ _KINDS = {
     "mm3": ("a volume", 1.0),
     "deg": ("an angle", 180 / math.pi),
     "s": ("a time", 1.0),
+    "N": ("a force", 1.0),
+    "N mm": ("a moment", 1.0),
+    "MPa": ("a pressure", 1.0),
     "1": ("a number", 1.0),
 }
 _LOW = 0.1  # det F, below which a state is hardly valid

@@ -46,6 +46,7 @@ KINDS = {
     "a force": Kind("N", ('"800 N"',)),
     "a stiffness": Kind("N/mm", ('"200 N/m"',)),
     "a damping": Kind("N*s/mm", ('"0.1 N s/m"',)),
+    "a moment": Kind("N*mm", ('"3 N m"',)),
     "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
     "a rate": Kind("1/s", ('"5 1/s"',)),
 }
