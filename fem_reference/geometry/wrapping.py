@@ -35,6 +35,15 @@ class Paths:
         """Length (n,) [mm] of each path."""
         return np.asarray(self.parts.sum(axis=1))
 
+    def directions(self) -> tuple[Floats, Floats]:
+        """Unit vectors (n, 3) along the paths where they leave their starts and where they reach their ends; 0 without a length."""
+        straight, wraps = self.ends - self.starts, self.parts[:, 1] > 0
+        climb = _along(self.touches[1] - self.touches[0], self.axes)
+        arms = (_across(touch - self.middles, self.axes) for touch in self.touches)
+        along = (self.turns[:, None] * np.cross(self.axes, arm) + climb for arm in arms)
+        first, last = (np.where(wraps[:, None], found, straight) for found in along)
+        return _units_or_zero(first), _units_or_zero(last)
+
     def at(self, which: Ints, shares: Floats) -> Floats:
         """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
         before, along, behind = self.parts[which].T
@@ -140,6 +149,11 @@ def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
 
 def _units(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+
+
+def _units_or_zero(vectors: Floats) -> Floats:
+    sizes = np.linalg.norm(vectors, axis=1)[:, None]
+    return np.asarray(vectors / np.where(sizes > 0, sizes, 1.0))
 
 
 def _along(vectors: Floats, axes: Floats) -> Floats:

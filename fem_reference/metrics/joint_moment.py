@@ -2,7 +2,7 @@
 
 A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
 space. Virtual work binds moment and energy: where nothing is dissipated, the moment is minus the slope of the stored energy in the
-angle. A run without forces, as those of most fast solvers, has none of these.
+angle. Lines of action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
 """
 
 import numpy as np

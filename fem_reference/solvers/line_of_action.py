@@ -1,7 +1,7 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
 Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on its length alone. A
+points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
 shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
@@ -18,6 +18,7 @@ from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
+from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
@@ -101,15 +102,16 @@ class Shortest:
             self.inside = Trouble("diverged", inside)
         else:
             self.found, lengths = _frame(passed, self.wrap, number, self.problem.fibres)
-            self.found.scalars.update(self._forces(lengths))
+            self.found.scalars.update(self._forces(lengths, passed, number))
 
-    def _forces(self, lengths: Floats) -> dict[str, float]:
-        """The force of all lines [N] of these lengths (k,) [mm], and the mean length of their fibres over the optimal one."""
+    def _forces(self, lengths: Floats, passed: Passed, number: int) -> dict[str, float]:
+        """Force [N] of lines of ``lengths`` (k,) [mm], mean length of fibres over the optimal one, forces on bones."""
         if self.hill is None:
             return {}
         pairs = zip(self.muscles, lengths.tolist(), strict=True)
         found = np.array([muscle.static(length, self.hill.activation) for muscle, length in pairs])
-        return {"muscle_force": float(found[:, 0].sum()), "fibre_length_mean": float(found[:, 1].mean())}
+        sums = {"muscle_force": float(found[:, 0].sum()), "fibre_length_mean": float(found[:, 1].mean())}
+        return sums | _on_bones(self.problem.bones, self.wrap, passed, number, found[:, 0])
 
     def trouble(self) -> Trouble | None:
         """The trouble with a fixed point inside the obstacle; None without."""
@@ -166,6 +168,30 @@ def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats
     pose = wrap.bone.pose(number)
     back = np.linalg.inv(pose)
     return wrap.obstacle.around(apply(back, starts), apply(back, ends)), pose
+
+
+def _on_bones(
+    bones: tuple[Bone, ...], wrap: Wrap | None, passed: Passed, number: int, tensions: Floats
+) -> dict[str, float]:
+    """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
+
+    A part pulls at both of its ends along itself; its obstacle gets the opposite of both, as what lies on it has no weight.
+    """
+    fixed, on_bone = passed.points, passed.on
+    paths, pose = _paths(wrap, fixed, number)
+    pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]
+    first, last = (pulls * ends @ pose[:3, :3].T for ends in paths.directions())
+    starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
+    by = [(on_bone[:, :-1].ravel(), starts, first), (on_bone[:, 1:].ravel(), ends, -last)]
+    if wrap is not None:
+        around = np.full(len(starts), bones.index(wrap.bone))
+        by += [(around, starts, -first), (around, ends, last)]
+    on, places, forces = (np.concatenate(parts) for parts in zip(*by, strict=True))
+    found = dict[str, float]()
+    for i, bone in enumerate(bones):
+        found |= vector_scalars(f"force_on_{bone.name}", forces[on == i].sum(axis=0))
+        found |= vector_scalars(f"moment_on_{bone.name}", np.cross(places, forces)[on == i].sum(axis=0))
+    return found
 
 
 def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:

@@ -111,3 +111,8 @@ def test_forces_on_all_bones_balance(bar: tuple[Run, MeasurementContext]) -> Non
     assert_allclose(forces["floor"] + forces["lid"], 0, atol=1e-6 * greatest)
     moments = run.moment("floor") + run.moment("lid")
     assert_allclose(moments, 0, atol=1e-6 * np.abs(run.moment("lid")).max())
+
+
+def test_a_case_without_a_joint_has_no_moment() -> None:
+    run = pulled()
+    assert measure(run, at_rest(run), replace(context(run), joints=()), ["joint_moment"]) == ()

@@ -20,7 +20,7 @@ from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.setup import Bone
+from fem_reference.problems.setup import Bone, Joint
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -38,7 +38,11 @@ def bar(motion=SWING, points: int = 41, bottom=None) -> MuscleProblem:
     heights = np.linspace(0, 30, points)
     bent = np.column_stack([np.full(points, 5.0), 5 + 4 * np.sin(math.pi * heights / 30), heights])
     straight = np.column_stack([np.full(points, 4.0), np.full(points, 5.0), heights[::-1]])
-    return replace(given, fibres=Polylines(np.vstack([bent, straight]), np.array([0, points, 2 * points])))
+    counter = Joint(
+        "counter", given.bones[0], np.array([1.0, 0, 0]), np.zeros(3), float
+    )  # its angle is the frame's number
+    fibres = Polylines(np.vstack([bent, straight]), np.array([0, points, 2 * points]))
+    return replace(given, fibres=fibres, joints=(counter,))
 
 
 def solved(given: MuscleProblem, **settings: object) -> tuple[Outcome, list[Frame]]:
@@ -386,3 +390,95 @@ def test_lines_pull_as_hills_muscles_of_their_lengths() -> None:
     _, slack = solved(bar(Translation((0, 0, -1), (0.0, 10.0), (0.0, 20.0))), hill=HILL)
     assert slack[-1].scalars["muscle_force"] == 0
     assert "muscle_force" not in solved(given)[1][0].scalars
+
+
+def exerted(frame: Frame, bone: str) -> tuple[np.ndarray, np.ndarray]:
+    """Force [N] and moment about the origin [N mm] on a bone."""
+    force, moment = (
+        np.array([frame.scalars[f"{kind}_on_{bone}_{axis}"] for axis in "xyz"]) for kind in ("force", "moment")
+    )
+    return force, moment
+
+
+PULLED = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))  # lines get longer
+
+
+def alone(given: MuscleProblem, line: int) -> MuscleProblem:
+    """The problem with one of its two fibres."""
+    low, high = given.fibres.offsets[line : line + 2]
+    return replace(given, fibres=Polylines(given.fibres.points[low:high], np.array([0, high - low])))
+
+
+@pytest.mark.parametrize("activation", [0.0, 1.0])  # 0: the parallel element alone
+def test_a_straight_line_about_a_hinge_has_the_moment_of_its_arm(activation) -> None:
+    """A line from A, which rests, to B, which turns about a hinge H along x: the moment is the force times the distance of H."""
+    given = alone(bar(PULLED), 0)
+    _, frames = solved(given, hill=HILL | {"activation": activation, "fibre_share": 0.9, "pennation": "0 deg"})
+    start, end, hinge = given.fibres.points[0], given.fibres.points[-1], np.array([5.0, 25, 15])
+    for frame in frames[1:]:
+        across = apply(PULLED.pose(frame.number), end[None])[0] - start
+        arm = np.cross(hinge - start, across)[0] / np.linalg.norm(across)  # signed: both are in the plane of y and z
+        force, moment = exerted(frame, "top")
+        tension = frame.scalars["muscle_force"]
+        assert tension > 1
+        assert_allclose(force, -tension * across / np.linalg.norm(across), rtol=1e-12, atol=1e-9)
+        assert_allclose(moment[0] - np.cross(hinge, force)[0], tension * arm, rtol=1e-12)
+
+
+# Of three points lines leave out the middle one, on another bone than the rest, in all frames but number 5.
+LEFT_OUT = {"at": 0.5, "bone": "bottom", "joint": "counter", "within": ["4 rad", "6 rad"]}
+OBSTACLES = [
+    {},
+    {"via": [{"at": 0.3, "bone": "top"}, LEFT_OUT, {"at": 0.6, "bone": "top"}]},
+    {"via": [{"at": 0.3, "bone": "top"}, {"at": 0.6, "bone": "bottom"}]},
+    {"sphere": {"bone": "bottom", "centre": "5, 8, 15 mm", "radius": "6 mm"}},
+    {"cylinder": {"bone": "top", "start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}},
+]
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+def test_the_moment_is_the_force_times_minus_the_slope_of_the_length(obstacle) -> None:
+    """Virtual work, around obstacles too: central differences of the lengths over 2e-4 rad, whose error is of the order of 1e-8."""
+    step, middle = 1e-4, 0.55
+    turn = Rotation((1, 0, 0), (5, 25, 15), (0.0, 1.0, 2.0, 3.0), (0.0, -middle - step, -middle, -middle + step))
+    for line in (0, 1):
+        given = alone(replace(bar(turn, points=2001), frames=(0, 1, 2, 3)), line)
+        shares = {"fibre_share": 0.9, "pennation": "0 deg", "activation": 0.5}
+        outcome, frames = solved(given, hill=HILL | shares, **obstacle)
+        assert outcome.status == "converged"
+        # Length of the paths, not of the chords: the same force law has them, and its inverse is not needed.
+        problem = line_of_action.Shortest(
+            given, parse(line_of_action.LineSettings, obstacle | {"hill": HILL | shares}, "")
+        )
+        long = [line_of_action._frame(problem.lines.at(n), problem.wrap, n, given.fibres)[1][0] for n in (1, 3)]
+        force, moment = exerted(frames[2], "top")
+        tension = frames[2].scalars["muscle_force"]
+        assert tension > 1
+        about = moment[0] - np.cross([5, 25, 15], force)[0]
+        assert_allclose(about, -tension * (long[1] - long[0]) / (2 * step), rtol=1e-6, atol=1e-6 * tension)
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+def test_forces_and_moments_on_all_bones_balance(obstacle) -> None:
+    _, frames = solved(bar(PULLED), hill=HILL, **obstacle)
+    for frame in frames[1:]:
+        parts = [exerted(frame, bone) for bone in ("bottom", "top")]
+        assert np.abs(parts[0][0]).max() > 1
+        for one, other in zip(*parts, strict=True):
+            assert_allclose(one + other, 0, atol=1e-9 * np.abs(one).max())
+
+
+def test_what_turns_as_a_whole_turns_its_forces() -> None:
+    """Bones that move together in a scene of an obstacle: the forces turn with them."""
+    _, frames = solved(bar(SWING, bottom=SWING), hill=HILL | {"fibre_share": 0.9}, **OBSTACLES[2])
+    first, moment = exerted(frames[0], "top")
+    turn = SWING.pose(10)
+    force, turned = exerted(frames[-1], "top")
+    assert np.abs(first).max() > 1
+    assert_allclose(force, turn[:3, :3] @ first, rtol=1e-9, atol=1e-9)
+    assert_allclose(turned, turn[:3, :3] @ moment + np.cross(turn[:3, 3], force), rtol=1e-9, atol=1e-7)
+
+
+def test_lines_without_hill_have_no_force() -> None:
+    _, frames = solved(bar())
+    assert not [name for frame in frames for name in frame.scalars if "force" in name or "moment" in name]

@@ -75,12 +75,12 @@ class Guided:
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """The points (k, q + 1, 3) [mm] that k lines pass at a frame, with q parts between them, counted line by line.
-
-    Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
+    """The points (k, q + 1, 3) [mm] that k lines pass at a frame, each on the bone ``on`` (k, q + 1), with q parts between them,
+    counted line by line. Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
     """
 
     points: Floats
+    on: Ints
     part: Ints
     share: Floats
 
@@ -109,7 +109,7 @@ class Lines:
             moved[self.on == i] = apply(self.bones[i].pose(number), resting[self.on == i])
         kept = [j for j in range(len(self.places)) if j not in self.guided or self.guided[j].passed(number)]
         part, share = _layout(tuple(self.sizes.tolist()), tuple(self.places[j] for j in kept))
-        return Passed(moved[:, kept], part, share)
+        return Passed(moved[:, kept], self.on[:, kept], part, share)
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
