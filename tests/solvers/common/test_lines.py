@@ -25,18 +25,19 @@ ANGLES = {0: 0.0, 5: 0.6, 10: 1.2}
 ON_TOP = {"at": 0.5, "bone": "bottom", "joint": "hinge"}
 
 
-def hinged(sign: float = 1.0) -> MuscleProblem:
+def hinged(sign: float = 1.0, swing: Rotation = SWING) -> MuscleProblem:
     """A bar of 30 mm with a straight line beside its middle; its top turns, counted by ``sign``."""
-    given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": SWING}, (), tuple(ANGLES))
+    given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": swing}, (), tuple(ANGLES))
+    slope = sign * swing.angles[-1] / swing.frames[-1]
     line = np.column_stack([np.full(21, 5.0), np.full(21, 3.0), np.linspace(0, 30, 21)])
     top = next(bone for bone in given.bones if bone.name == "top")
-    joint = Joint("hinge", top, np.array([sign, 0, 0]), np.array(SWING.centre), lambda frame: sign * 0.12 * frame)
+    joint = Joint("hinge", top, np.array([sign, 0, 0]), np.array(SWING.centre), lambda frame: slope * frame)
     return replace(given, fibres=Polylines(line, np.array([0, 21])), joints=(joint,))
 
 
-def solved(given: MuscleProblem, *via: dict[str, object]) -> list[Frame]:
+def solved(given: MuscleProblem, *via: dict[str, object], **more: object) -> list[Frame]:
     frames: list[Frame] = []
-    settings = parse(line_of_action.LineSettings, {"via": list(via)}, "candidate[0]")
+    settings = parse(line_of_action.LineSettings, {"via": list(via)} | more, "candidate[0]")
     assert line_of_action.solve(given, settings, frames.append).status == "converged"
     return frames
 
@@ -109,6 +110,25 @@ def test_a_point_left_out_leaves_the_others_where_they_are() -> None:
         assert_allclose(both[i].fibres, alone[i].fibres, atol=1e-12)
     assert_allclose(both[1].fibres[10], [5, 3, 15], atol=1e-12)
     assert np.abs(both[1].fibres - alone[1].fibres).max() > 0.1
+
+
+def test_a_point_left_out_pulls_at_no_bone() -> None:
+    """Where the point on the bone below is left out, the straight line pulls both bones along itself; where it is passed, the bone
+    above is pulled towards the point. Forces balance at every frame.
+    """
+    lengthens = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))
+    hill = {"max_force": "500 N", "fibre_share": 0.9, "pennation": "0 deg"}
+    via = {"at": 0.5, "bone": "bottom", "joint": "hinge", "within": ["-0.4 rad", "-0.2 rad"]}
+    frames = solved(hinged(swing=lengthens), via, hill=hill)
+    for frame, last in zip(frames, ([5, 3, 0], [5, 3, 15], [5, 3, 0]), strict=True):
+        end = apply(lengthens.pose(frame.number), np.array([[5.0, 3, 30]]))[0]
+        above, below = (
+            np.array([frame.scalars[f"force_on_{bone}_{axis}"] for axis in "xyz"]) for bone in ("top", "bottom")
+        )
+        tension = frame.scalars["muscle_force"]
+        assert tension > 1
+        assert_allclose(above, tension * (last - end) / math.dist(last, end), rtol=1e-9, atol=1e-9 * tension)
+        assert_allclose(above + below, 0, atol=1e-9 * tension)
 
 
 @pytest.mark.parametrize(
