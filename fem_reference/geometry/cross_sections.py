@@ -1,6 +1,7 @@
 """Sections of a muscle where a field has a value, as triangles, each mapped to the unit square."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
@@ -33,35 +34,39 @@ class CrossSection:
         products = np.einsum("mki,mkj->mij", corners, corners) + sums[:, :, None] * sums[:, None, :]
         return centre, np.einsum("m,mij->ij", areas / 12, products) / areas.sum()
 
-    def square(self, first: Floats) -> Floats:
-        """The place (n, 2) in the unit square of each point, by a harmonic map; ``first`` (3,) is the direction of its first side.
+    @cached_property
+    def rim(self) -> Ints:
+        """The points (k,) of the boundary, counter-clockwise about the normal."""
+        loop = np.asarray(igl.boundary_loop(self.triangles.astype(np.int64)))
+        corners = self.points[loop] - self.points[loop].mean(axis=0)
+        upward = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0) @ self.normal > 0
+        return loop if upward else loop[::-1]
 
-        On the boundary the places keep the shares of length after a stretch that makes the section as wide as high, so that a
-        rectangle is mapped linearly.
+    def turns(self, first: Floats) -> Floats:
+        """The place (k,) of each point of the rim around the unit square, in turns from the middle of its side x = 1;
+        ``first`` (3,) is the direction of its first side.
+
+        They are shares of length after a stretch that makes the section as wide as high, so that a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
         values, vectors = np.linalg.eigh(axes @ product @ axes.T)
-        even = (self.points - centre) @ axes.T @ (vectors / np.sqrt(values)) @ vectors.T
-        loop = np.asarray(igl.boundary_loop(self.triangles.astype(np.int64)))
+        return _around((self.points[self.rim] - centre) @ axes.T @ (vectors / np.sqrt(values)) @ vectors.T)
+
+    def square(self, turns: Floats) -> Floats:
+        """The place (n, 2) in the unit square of each point, by a harmonic map; ``turns`` (k,) are those of the rim."""
         found = np.zeros((len(self.points), 2))
-        if np.sum(_cross(even[loop], even[np.roll(loop, -1)])) < 0:
-            loop = loop[::-1]
-        found[loop] = _around(even[loop])
-        inner = np.setdiff1d(np.arange(len(self.points)), loop)
+        found[self.rim] = np.stack([np.interp(turns, _SHARES, side) for side in _SQUARE], axis=1)
+        inner = np.setdiff1d(np.arange(len(self.points)), self.rim)
         matrix = igl.cotmatrix(self.points, self.triangles.astype(np.int64)).tocsc()
         if len(inner):
-            right = -(matrix[inner][:, loop] @ found[loop])
+            right = -(matrix[inner][:, self.rim] @ found[self.rim])
             found[inner] = np.asarray(spsolve(matrix[inner][:, inner], right)).reshape(-1, 2)
         return found
 
 
-def _cross(one: Floats, other: Floats) -> Floats:
-    return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
-
-
 def _around(loop: Floats) -> Floats:
-    """The places (k, 2) on the unit square's boundary of a counter-clockwise ``loop`` (k, 2) about the origin."""
+    """Shares (k,) of the length of a counter-clockwise ``loop`` (k, 2), from the farthest place where it meets the first axis."""
     ahead = np.roll(loop, -1, axis=0)
     lengths = np.linalg.norm(ahead - loop, axis=1)
     rises = np.flatnonzero((loop[:, 1] < 0) & (ahead[:, 1] >= 0))
@@ -69,8 +74,7 @@ def _around(loop: Floats) -> Floats:
     farthest = np.argmax(loop[rises, 0] + shares * (ahead[rises, 0] - loop[rises, 0]))
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     begin = along[rises[farthest]] + shares[farthest] * lengths[rises[farthest]]
-    at = ((along[:-1] - begin) / along[-1]) % 1
-    return np.stack([np.interp(at, _SHARES, side) for side in _SQUARE], axis=1)
+    return np.asarray(((along[:-1] - begin) / along[-1]) % 1)
 
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:

@@ -2,8 +2,7 @@
 
 Theirs has isocontours on the surface; here each is the rim of a section of the Laplace field in tetrahedra, and the points inside
 come from a harmonic map of that section. On the sections the points are in the muscle, between them lines may leave it where it
-bends. A muscle with several heads is followed along its greatest section only; where the outline of sections changes much from one
-to the next, as in gluteus maximus, lines turn sharply, more so with more sections.
+bends. A muscle with several heads is followed along its greatest section only; where that gains or loses a head, lines still turn.
 """
 
 from dataclasses import dataclass
@@ -14,28 +13,34 @@ from scipy.signal import savgol_filter
 from scipy.stats import qmc
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, normals
 from fem_reference.geometry.cross_sections import CrossSection, cross_section
 from fem_reference.geometry.curves import bezier
 from fem_reference.geometry.fibres import POINTS, FibreField, resample
+from fem_reference.geometry.section_rims import carried
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing lays a parabola
+_FLAT = 1e-9  # twice the area of a triangle in the unit square: three points of one side have none
 _SHORTEST = 0.1  # of the longest pennate fibre's extent along the muscle
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
     """``sections`` of a muscle from one attachment to the other, the place of their points in the unit ``squares``, and their
-    ``heights`` (k,) between 0 and 1, by length along their centres; ``length`` of that line and mean ``width`` along the squares'
-    first side [mm].
+    ``heights`` (k,) between 0 and 1, by length along their centres; ``length`` of that line [mm].
     """
 
     sections: tuple[CrossSection, ...]
     squares: tuple[Floats, ...]
     heights: Floats
     length: float
-    width: float
+
+    @property
+    def width(self) -> float:
+        """The mean distance [mm] between the middles of the sides of the squares that their first side joins."""
+        sides = np.array([[0.0, 0.5], [1.0, 0.5]])
+        return float(np.mean([np.linalg.norm(np.diff(self._on(i, sides), axis=0)) for i in range(len(self.sections))]))
 
     def place(self, cube: Floats) -> Floats:
         """Points (n, 3) [mm] of places (n, 3) in the unit ``cube``, linear between sections and beyond the last."""
@@ -52,6 +57,7 @@ class Contours:
     def _on(self, i: int, places: Floats) -> Floats:
         """Points (n, 3) on section ``i`` of ``places`` (n, 2) in its square."""
         square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
+        triangles = triangles[np.linalg.norm(normals(square[triangles]), axis=1) > _FLAT]
         _, hit, closest = igl.point_mesh_squared_distance(np.pad(places, ((0, 0), (0, 1))), square, triangles)
         corners = np.ascontiguousarray(square[triangles[hit]])
         shares = igl.barycentric_coordinates(closest, *(np.ascontiguousarray(corners[:, k]) for k in range(3)))
@@ -61,8 +67,8 @@ class Contours:
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
-    The first side of the middle one's square is along ``towards`` (3,), without it along its longest axis; the others' sides
-    follow by the least turn from section to section.
+    The first side of the middle one's square is along ``towards`` (3,), without it along its longest axis; the others follow from
+    section to section by the nearest points of their rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
@@ -74,10 +80,12 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
     centres = np.array([ends[0], *(centre for centre, _ in moments), ends[1]])
     along = np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))
     middle = len(sections) // 2
-    firsts = _firsts(sections, middle, _first(sections[middle], moments[middle][1], towards))
-    widths = [np.sqrt(12 * first @ product @ first) for first, (_, product) in zip(firsts, moments, strict=True)]
-    squares = tuple(one.square(first) for one, first in zip(sections, firsts, strict=True))
-    return Contours(sections, squares, along[:-1] / along[-1], float(along[-1]), float(np.mean(widths)))
+    turns = {middle: sections[middle].turns(_first(sections[middle], moments[middle][1], towards))}
+    ahead = [(i, i + 1) for i in range(middle, len(sections) - 1)]
+    for i, other in ahead + [(i, i - 1) for i in range(middle, 0, -1)]:
+        turns[other] = carried(sections[i], turns[i], sections[other])
+    squares = tuple(one.square(turns[i]) for i, one in enumerate(sections))
+    return Contours(sections, squares, along[:-1] / along[-1], float(along[-1]))
 
 
 def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
@@ -88,25 +96,6 @@ def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Flo
     flat = towards - (towards @ middle.normal) * middle.normal
     if np.linalg.norm(flat) < 1e-6 * np.linalg.norm(towards):
         raise InputError(f"{PLACE}.towards", "a direction along the muscle", "one across it")
-    return np.asarray(flat / np.linalg.norm(flat))
-
-
-def _firsts(sections: tuple[CrossSection, ...], middle: int, first: Floats) -> list[Floats]:
-    """The first direction (3,) of each section, from the ``middle`` one's in both directions."""
-    found = {middle: first}
-    ahead = [(i, i + 1) for i in range(middle, len(sections) - 1)]
-    back = [(i, i - 1) for i in range(middle, 0, -1)]
-    for known, other in ahead + back:
-        found[other] = _turned(found[known], sections[known].normal, sections[other].normal)
-    return [found[i] for i in range(len(sections))]
-
-
-def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
-    """The ``vector`` (3,) by the least turn from unit vector ``one`` to unit vector ``other``."""
-    axis = np.cross(one, other)
-    once = np.cross(axis, vector)
-    turned = vector + once + np.cross(axis, once) / np.maximum(1 + one @ other, 1e-6)
-    flat = turned - (turned @ other) * other
     return np.asarray(flat / np.linalg.norm(flat))
 
 

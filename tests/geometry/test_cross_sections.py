@@ -21,8 +21,8 @@ def test_a_rectangle_has_its_area_moments_and_a_linear_map(level: float) -> None
     centre, product = found.moments
     assert_allclose(centre, [7, 5, level], atol=1e-3)
     assert_allclose(product[:2, :2], np.diag([14**2, 10**2]) / 12, atol=1e-5)
-    assert_allclose(found.square(np.array([1.0, 0, 0])), found.points[:, :2] / [14, 10], atol=1e-5)
-    turned = found.square(np.array([0.0, 1, 0]))
+    assert_allclose(found.square(found.turns(np.array([1.0, 0, 0]))), found.points[:, :2] / [14, 10], atol=1e-5)
+    turned = found.square(found.turns(np.array([0.0, 1, 0])))
     assert_allclose(turned, np.column_stack([found.points[:, 1] / 10, 1 - found.points[:, 0] / 14]), atol=1e-5)
 
 
