@@ -122,8 +122,8 @@ def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: 
         got = f"fibre {sizes.argmin()} of {sizes.min()} points"
         want = f"fibres of at least {parts + 1} points for {parts - 1} via-points"
         raise InputError(join(place, "via"), got, want)
-    fixed = np.array([_along(fibres.points[low:high], list(places)) for low, high in pairwise(fibres.offsets)])
-    ends = [_nearest(problem, fixed[:, end], place) for end in (0, -1)]
+    fixed = np.array([along(fibres.points[low:high], list(places)) for low, high in pairwise(fibres.offsets)])
+    ends = [nearest_bones(problem, fixed[:, end], place) for end in (0, -1)]
     nearer = [ends[int(at > 0.5)] for at in evenly]
     on = np.column_stack([ends[0], *(np.full(len(fibres), via) for via in named), *nearer, ends[1]])
     guided = {
@@ -134,7 +134,7 @@ def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: 
     return Lines(problem.bones, fixed, on, sizes, places, guided)
 
 
-def _along(points: Floats, places: list[float]) -> Floats:
+def along(points: Floats, places: list[float]) -> Floats:
     """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     wanted = np.array(places) * travelled[-1]
@@ -158,7 +158,7 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]
 
 
-def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
+def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
         raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")

@@ -1,0 +1,245 @@
+"""VIPER: a muscle as a bundle of rods with volume, bends and twist, by position based dynamics.
+
+Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each and segments with a frame each; it resists stretch
+and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
+stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
+
+Each fibre of the case is a rod, clamped at the bones nearest to its ends. There is neither mass nor time: a frame number begins
+with the one before, moved by a blend of the bones, and stiffnesses are shares of an error, as in ``pbd``. Every rod has one radius
+at rest, such that all together have the muscle's volume. Only rods keep their volume; the surface that they carry may not.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
+from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
+from fem_reference.solvers.common.frame_loop import carry, follow
+from fem_reference.solvers.common.lines import along, nearest_bones
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
+from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.pbd import Stiffness
+from fem_reference.solvers.viper_kernels import product, project_bend, project_stretch, project_volume, unit, volumes
+
+# Neighbours of a rod in its bundle, and points of rods that carry a vertex.
+_AROUND, _CARRIERS = 6, 12
+
+
+class ViperSettings(Record):
+    """``points``: of each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``, ``bending``,
+    ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods keep their
+    radius away from bones, or what they have at rest, and the surface leaves bones; off where the key is omitted.
+    """
+
+    points: Annotated[int, Field(ge=4), Trade((6, 12, 24))]
+    iterations: Annotated[int, Field(gt=0), Trade((3, 10, 30))]
+    stretch: Stiffness
+    bending: Stiffness
+    volume: Stiffness
+    bundle: Stiffness
+    contact: bool = False
+
+
+class Bundle:
+    """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``, where points of a section, one of each rod, are tied to those around them.
+
+    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; a point is
+    wanted at the mean of what its groups say.
+    """
+
+    def __init__(self, rest: Floats, radius: float) -> None:
+        self.rest, self.radius, self.middle = rest, radius, rest.mean(axis=(0, 1))
+        self.sections = (rest - self.middle).swapaxes(0, 1)
+        self.groups = np.array([shares(points, points, _AROUND).toarray() for points in self.sections])
+        self.back = self.groups.swapaxes(1, 2) / self.groups.sum(axis=1)[..., None]
+        self.means = self.groups @ self.sections
+        sizes = self.groups @ (np.sum(self.sections**2, axis=2, keepdims=True) + 3 * radius**2)
+        self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
+
+    def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
+        """The points (k, p, 3) [mm] and radii (k, p) [mm] that are wanted in place of the present ones, with ``frames`` (k, p, 3, 3)."""
+        now = (points - self.middle).swapaxes(0, 1)
+        parts = now[..., None] * self.sections[..., None, :]
+        parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)
+        sums = self.groups @ np.concatenate([now, parts.reshape(*now.shape[:2], 9)], axis=2)
+        means, spread = sums[..., :3], sums[..., 3:].reshape(*parts.shape)
+        spread = spread - means[..., None] * self.means[..., None, :]
+        u, _, v = np.linalg.svd(spread)
+        u[..., 2] *= np.linalg.det(u @ v)[..., None]
+        scales = np.sum(u @ v * spread, axis=(2, 3)) / self.sizes
+        maps = scales[..., None, None] * (u @ v)
+        shifts = means - np.einsum("pkij,pkj->pki", maps, self.means)
+        found = self.back @ np.concatenate([maps.reshape(*now.shape[:2], 9), shifts, scales[..., None]], axis=2)
+        wanted = np.einsum("pkij,pkj->pki", found[..., :9].reshape(*parts.shape), self.sections) + found[..., 9:12]
+        return wanted.swapaxes(0, 1) + self.middle, self.radius * found[..., 12].T
+
+
+class Rods:
+    """A muscle as rods going from frame number to frame number."""
+
+    advice = "a slower motion, more iterations, or contact = false, may help"
+
+    def __init__(self, problem: MuscleProblem, settings: ViperSettings) -> None:
+        fibres, places = problem.fibres, np.linspace(0, 1, settings.points)
+        lines = np.split(fibres.points, fibres.offsets[1:-1])
+        rest = np.array([along(line, places.tolist()) for line in lines])
+        self.problem, self.settings, self.rest, self.steps = problem, settings, rest, np.diff(rest, axis=1)
+        inside = enclosed_volume(problem.surface.points, problem.surface.triangles)
+        self.radius = float(np.sqrt(inside / np.pi / np.linalg.norm(self.steps, axis=2).sum()))
+        self.bundle = Bundle(rest, self.radius)
+        self.points, self.radii = (
+            problem.begin(rest.reshape(-1, 3)).reshape(rest.shape),
+            np.full(rest.shape[:2], self.radius),
+        )
+        self.turns = np.tile([1.0, 0.0, 0.0, 0.0], (*self.steps.shape[:2], 1))
+        self.volumes = volumes(rest, self.radii)
+        self.ends = [nearest_bones(problem, rest[:, end], "viper") for end in (0, -1)]
+        self.last = problem.frames[0]
+        self.surface, self.fibres = (problem.begin(points) for points in (problem.surface.points, fibres.points))
+        self.of_surface = shares(problem.surface.points, rest.reshape(-1, 3), _CARRIERS)
+        self.of_fibres = _along_rods(lines, settings.points)
+        self.bones, self.skin_bones = self._bones(), list[CollidingBone]()
+        if settings.contact:
+            at, attached = problem.surface.points, problem.attached_vertices
+            self.skin_bones = colliding_bones(problem.bones, at, attached, 0.0)
+        self.checks = surface_checks(problem.surface, problem.attached_vertices)
+        free = settings.points - 2
+        self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free - 1) + 2))}
+
+    def _bones(self) -> list[CollidingBone]:
+        """The bones that rods stay out of."""
+        if not self.settings.contact:
+            return []
+        count, points = self.settings.points, self.rest.reshape(-1, 3)
+        ends = np.flatnonzero(np.arange(len(points)) % count % (count - 1) == 0)
+        return colliding_bones(self.problem.bones, points, ends, self.radius)
+
+    def move(self, number: int) -> None:
+        """Find the rods at a frame, and what they carry."""
+        self._begin(number)
+        for bone in (*self.bones, *self.skin_bones):
+            bone.move(number)
+        for _ in range(self.settings.iterations):
+            self._sweep()
+        self._carry(number)
+
+    def _begin(self, number: int) -> None:
+        """Move rods as a blend of the bones at their ends, which are at their bones."""
+        share, between = (np.linspace(0, 1, self.settings.points - i)[:, None] for i in (0, 1))
+        first, last = (self._moved(ends, number) for ends in self.ends)
+        self.points = (1 - share) * first[0] + share * last[0]
+        self.turns = unit((1 - between) * first[1] + between * last[1])
+        for ends, i in zip(self.ends, (0, -1), strict=True):
+            self.points[:, i] = [apply(self._bone(n).pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
+        self.last = number
+
+    def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
+        """Points and turns as if each rod were fixed to the bones ``ends`` (k,) of one end since the frame before ``number``."""
+        points, turns = np.empty_like(self.points), np.empty_like(self.turns)
+        for n in np.unique(ends):
+            step = self._bone(n).pose(number) @ np.linalg.inv(self._bone(n).pose(self.last))
+            quaternion = Rotation.from_matrix(step[:3, :3]).as_quat(canonical=True, scalar_first=True)
+            points[ends == n] = apply(step, self.points[ends == n].reshape(-1, 3)).reshape(-1, *points.shape[1:])
+            turns[ends == n] = product(quaternion, self.turns[ends == n])
+        return points, turns
+
+    def _bone(self, index: int) -> Bone:
+        return self.problem.bones[index]
+
+    def _sweep(self) -> None:
+        """Project all constraints once."""
+        chosen = self.settings
+        project_stretch(self.points, self.turns, self.steps, chosen.stretch)
+        project_bend(self.turns, chosen.bending)
+        points, radii = self.bundle.goals(self.points, self.radii, self._frames())
+        self.points[:, 1:-1] += chosen.bundle * (points - self.points)[:, 1:-1]
+        self.radii += chosen.bundle * (radii - self.radii)
+        project_volume(self.points, self.radii, self.volumes, chosen.volume)
+        flat = self.points.reshape(-1, 3)
+        move_out(flat, self.bones, 1.0)
+
+    def _frames(self) -> Floats:
+        """The rotation (k, p, 3, 3) at each point, in the middle between those of its segments."""
+        turns = self.turns
+        sign = np.where(np.sum(turns[:, 1:] * turns[:, :-1], axis=2, keepdims=True) < 0, -1.0, 1.0)
+        found = np.concatenate([turns[:, :1], unit(turns[:, :-1] + sign * turns[:, 1:]), turns[:, -1:]], axis=1)
+        matrices = Rotation.from_quat(found.reshape(-1, 4), scalar_first=True).as_matrix()
+        return np.asarray(matrices.reshape(*found.shape[:2], 3, 3))
+
+    def _carry(self, number: int) -> None:
+        """Move surface and fibres with the rods, each point of which turns and scales what is around it."""
+        maps = (self.radii / self.radius)[..., None, None] * self._frames()
+        shifts = self.points - np.einsum("kpij,kpj->kpi", maps, self.rest)
+        parts = np.concatenate([maps.reshape(-1, 9), shifts.reshape(-1, 3)], axis=1)
+        self.surface = _carried(self.problem.surface.points, self.of_surface @ parts)
+        self.fibres = _carried(self.problem.fibres.points, self.of_fibres @ parts)
+        carry(self.surface, self.problem, number)
+        move_out(self.surface, self.skin_bones, 1.0)
+
+    def trouble(self) -> Trouble | None:
+        """The trouble with the surface; None without."""
+        return first_trouble(self.checks, self.surface)
+
+    def frame(self, number: int) -> Frame:
+        """Surface and fibres; scalars: the volume of the rods over that at rest, the least and the greatest of the segments."""
+        ratio = volumes(self.points, self.radii) / self.volumes
+        scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
+        return Frame(number, self.surface.copy(), self.fibres.copy(), scalars=scalars)
+
+    def ending(self) -> Outcome:
+        """Converged: every iteration counts as such."""
+        count, points = self.rest.shape[:2]
+        return Outcome("converged", f"{count} rods of {points} points, of {self.radius:.3g} mm radius at rest")
+
+
+def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
+    """The shares (n, m) of the ``count`` nearest ``carriers`` (m, 3) in ``points`` (n, 3), zero at the next nearest."""
+    asked = min(count + 1, len(carriers))
+    away, near = (found.reshape(len(points), asked) for found in cKDTree(carriers).query(points, k=asked))
+    reach = away[:, -1:] * (1 if asked > count else 2) + np.finfo(float).tiny
+    # All of them may be as near: then each has the same share.
+    weights = (1 - (away / reach) ** 2) ** 2 + 1e-12
+    weights /= weights.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(len(points)), asked)
+    return csr_array((weights.ravel(), (rows, near.ravel())), shape=(len(points), len(carriers)))
+
+
+def _along_rods(lines: list[Floats], count: int) -> csr_array:
+    """The shares (n, k * count) of points of rods in the points of ``lines``: of the two ends of the segment that each is on."""
+    rows, columns, weights, done = list[Ints](), list[Ints](), list[Floats](), 0
+    for rod, line in enumerate(lines):
+        travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        at = travelled / travelled[-1] * (count - 1)
+        low = np.minimum(at.astype(np.int64), count - 2)
+        rows += 2 * [done + np.arange(len(line))]
+        columns += [rod * count + low, rod * count + low + 1]
+        weights += [1 - (at - low), at - low]
+        done += len(line)
+    parts = (np.concatenate(part) for part in (weights, rows, columns))
+    values, row, column = parts
+    return csr_array((values, (row, column)), shape=(done, len(lines) * count))
+
+
+def _carried(rest: Floats, parts: Floats) -> Floats:
+    """Points at ``rest`` (n, 3) [mm] after linear maps and shifts ``parts`` (n, 12)."""
+    return np.asarray(np.einsum("nij,nj->ni", parts[:, :9].reshape(-1, 3, 3), rest) + parts[:, 9:])
+
+
+def solve(problem: MuscleProblem, settings: ViperSettings, sink: Sink) -> Outcome:
+    """Find the rods at every frame number."""
+    return follow(Rods(problem, settings), problem, sink)
+
+
+_USUAL = {"points": 12, "iterations": 10, "stretch": 1.0, "bending": 0.5, "volume": 1.0, "bundle": 0.5}
+_TABLE = TableRow("VIPER", "viper", _USUAL | {"contact": True})
+SOLVES = (MuscleSolver(settings=ViperSettings, solve=solve, example=_USUAL, table=(_TABLE,), fibres=lambda _: True),)

@@ -1,0 +1,93 @@
+"""Rods of position based dynamics: quaternions and the projections of constraints.
+
+Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p - 1, 4), unit quaternions (w, x, y, z)
+that take each segment's frame from rest. The ends' points and turns are given by bones, all others are free.
+
+All constraints of a kind are projected at once, after Jacobi, each by no more than keeps the sum of its neighbours' steps from
+overshooting. Where constraints contradict each other the limit is the least sum of squares, whatever the order of points.
+"""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+
+
+def product(p: Floats, q: Floats) -> Floats:
+    """Products (..., 4) of quaternions."""
+    a, b, c, d = (p[..., [i]] for i in range(4))
+    w, x, y, z = (q[..., [i]] for i in range(4))
+    real, i = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
+    return np.concatenate([real, i, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w], axis=-1)
+
+
+def pure(vectors: Floats) -> Floats:
+    """The quaternions (..., 4) without real part of ``vectors`` (..., 3)."""
+    return np.concatenate([np.zeros_like(vectors[..., :1]), vectors], axis=-1)
+
+
+def conjugate(turns: Floats) -> Floats:
+    """The opposite turns (..., 4)."""
+    return np.asarray(turns * [1.0, -1.0, -1.0, -1.0])
+
+
+def turned(turns: Floats, vectors: Floats) -> Floats:
+    """The ``vectors`` (..., 3) turned by ``turns`` (..., 4)."""
+    return product(product(turns, pure(vectors)), conjugate(turns))[..., 1:]
+
+
+def unit(quaternions: Floats) -> Floats:
+    """The ``quaternions`` (..., 4) divided by their norm."""
+    return np.asarray(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True))
+
+
+def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: float) -> None:
+    """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment, at ``rest`` (k, p - 1, 3) [mm] l times t.
+
+    Neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment is along its frame and as long as at rest. A frame has
+    the inverse mass 1 / l^2, so that nothing depends on the unit of length: the sum over masses and squared slopes is 1 + 1 + 4
+    times 1 / l^2, and 2 more bound what neighbours do.
+    """
+    lengths = np.linalg.norm(rest, axis=2, keepdims=True)
+    tangents, u = rest / lengths, turns[:, 1:-1]
+    step = stiffness / 8 * (turned(turns, tangents) - np.diff(points, axis=1) / lengths)
+    points[:, 1:-1] -= np.diff(lengths * step, axis=1)
+    u += 2 * product(pure(step[:, 1:-1]), product(u, pure(tangents[:, 1:-1])))
+    u[:] = unit(u)
+
+
+def project_bend(turns: Floats, stiffness: float) -> None:
+    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments: they bend and twist as little as they can.
+
+    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: what is curved at rest remains so.
+    """
+    a, b, found = turns[:, :-1], turns[:, 1:], np.zeros_like(turns)
+    step = pure(-stiffness / 4 * product(conjugate(a), b)[..., 1:])
+    found[:, :-1] -= product(b, step)
+    found[:, 1:] += product(a, step)
+    turns[:, 1:-1] += found[:, 1:-1]
+    turns[:, 1:-1] = unit(turns[:, 1:-1])
+
+
+def volumes(points: Floats, radii: Floats) -> Floats:
+    """Volumes (k, p - 1) [mm3] of segments as cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
+    a, b = radii[:, :-1], radii[:, 1:]
+    return np.asarray(np.pi / 3 * np.linalg.norm(np.diff(points, axis=1), axis=2) * (a * a + a * b + b * b))
+
+
+def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float) -> None:
+    """Project ``C = V / V_0 - 1`` of each segment, whose volumes at ``rest`` are (k, p - 1) [mm3], by radii and points.
+
+    Each moves by the mean of what its two segments want; a radius at an end has one segment.
+    """
+    steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
+    lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest
+    square = a * a + a * b + b * b
+    # Slopes of C by the length and by both radii.
+    along, of_a, of_b = ratio / lengths, ratio * (2 * a + b) / square, ratio * (a + 2 * b) / square
+    step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)
+    points[:, 1:-1] -= np.diff((step * along / lengths)[..., None] * steps, axis=1)
+    change = np.zeros_like(radii)
+    change[:, :-1] += step * of_a
+    change[:, 1:] += step * of_b
+    change[:, [0, -1]] *= 2
+    radii += change
