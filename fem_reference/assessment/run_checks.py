@@ -194,7 +194,9 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external effects."""
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external effects. With
+    weights and dead loads these are what bones carry; other external forces depend on the deformation.
+    """
     # The origin of force of a user's own effect is unknown.
     foreign = [one for one in problem.effects if not type(one).__module__.startswith("fem_reference.effects.")]
     outer = foreign or any(one.outer for one in problem.effects)
@@ -204,6 +206,13 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
         if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
             for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
                 yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
+    carried = [run.force(bone.name) for bone in problem.bones if f"force_on_{bone.name}_x" in run.scalars]
+    for i, number in enumerate(run.numbers if outer and not foreign and carried and math.isfinite(allowed) else ()):
+        if (load := problem.load(number)) is not None:
+            off, rounding = (
+                float(np.linalg.norm(one)) for one in (np.sum(carried, axis=0)[i] - load, _ROUNDING * load)
+            )
+            yield RunCheck("forces that bones do not carry", off, allowed + rounding, "N", number)
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:

@@ -1,10 +1,14 @@
 """Weight, or any other steady acceleration."""
 
 import math
+from collections.abc import Callable
 from typing import Any, ClassVar
+
+import numpy as np
 
 from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.units import AccelerationVector, Density
 
 
@@ -28,6 +32,10 @@ class Gravity(Ramped, Energy):
             scene.bend(force),
             force * scene.length,
         )
+
+    def resultant(self, volume: float, area: Callable[[str], float]) -> Floats:  # noqa: ARG002
+        """The weight."""
+        return self.density * volume * np.array(self.acceleration)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

@@ -111,6 +111,18 @@ class MuscleProblem(Setup):
         """The effect of contact, None where there is none."""
         return among(self.effects)
 
+    def load(self, frame: float) -> Floats | None:
+        """The sum (3,) [N] of the external forces at a frame; None where it depends on the deformation."""
+        cells, volume = self.body.mesh, float(tet_volumes(self.mesh.points, self.mesh.tets).sum())
+        forces = [
+            one.resultant(volume, lambda part: float(triangle_areas(cells.points, cells.facets[part]).sum()))
+            for one in self.effects
+        ]
+        known = [
+            one.amount(frame) * force for one, force in zip(self.effects, forces, strict=True) if force is not None
+        ]
+        return None if len(known) < len(forces) else np.sum(known, axis=0)
+
     def write_meshes(self, folder: Path) -> None:
         """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
         files.write_surface(folder / "surface.vtp", self.surface, self.surface.points)

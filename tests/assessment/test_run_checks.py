@@ -165,6 +165,31 @@ def test_forces_that_are_not_in_balance(tmp_path) -> None:
         assert lost(replace(problem, effects=(*problem.effects, weighs)), replace(run, scalars=scalars)) == []
 
 
+def test_bones_carry_weights_and_dead_loads(tmp_path) -> None:
+    """A bar of 4,000 mm3 of water weighs 39.24 mN; 1 kPa on its four free sides of 400 mm2 each is 1.6 N."""
+    problem = away(coarse(tmp_path))
+    ramp = [{"frame": 0.0, "amount": 0.0}, {"frame": 20.0, "amount": 2.0}]
+    weighs = effects.make("gravity", density="1000 kg/m^3", acceleration="0, 0, -9.81 m/s^2", ramp=ramp)
+    pulled = effects.make("traction", on="free", force="1, 0, 0 kPa", ramp=ramp)
+    problem = replace(problem, effects=(*problem.effects, weighs, pulled))
+    carried = np.linspace(0, 2, 5)[:, None] * [1.6, 0.0, -0.03924]
+    scalars = {
+        f"force_on_{bone}_{axis}": carried[:, i] / 2 for bone in ("floor", "lid") for i, axis in enumerate("xyz")
+    }
+    origin, cost = {"settings": {"residual": 1e-9}}, {"unknowns": 1e4}
+    run = replace(resting(problem, **scalars), origin=origin, outcome=replace(CONVERGED, cost=cost))
+    assert lost(problem, run) == []
+    (check,) = (one for one in of_muscle(problem, run) if "carry" in one.name)
+    assert check.allowed == pytest.approx(1e-6, rel=0.01)
+    for wrong in (1e-3, np.nan):
+        less = run.scalars | {"force_on_lid_z": run.scalars["force_on_lid_z"] + [0, 0, 0, wrong, 0]}
+        assert lost(problem, replace(run, scalars=less)) == ["forces that bones do not carry"]
+    # A pressure follows the surface: its sum is not known.
+    squeezed = effects.make("pressure", on="free", pressure="1 kPa", ramp=ramp)
+    unknown = replace(problem, effects=(*problem.effects, squeezed))
+    assert not [one for one in of_muscle(unknown, run) if "carry" in one.name]
+
+
 def test_a_surface_through_itself(tmp_path) -> None:
     problem = away(coarse(tmp_path))
     side = np.flatnonzero((BLOCK.points[:, 0] == 10) & (BLOCK.points[:, 2] > 10) & (BLOCK.points[:, 2] < 30))

@@ -48,6 +48,22 @@ def test_every_shipped_control_is_denied_and_the_true_run_passes() -> None:
 
 
 @pytest.mark.slow
+def test_bones_carry_the_weight_of_a_true_run(tmp_path, monkeypatch) -> None:
+    """As much as the residual allows: the weight of the same muscle at the full amount is 0.1 mN at least."""
+    monkeypatch.chdir(tmp_path)
+    scene = small.write(tmp_path / "bar")
+    with (scene / "case.toml").open("a") as file:
+        file.write('\n[[effect]]\nname = "gravity"\ndensity = "1060 kg/m3"\nacceleration = "0, 9.81, -98.1 m/s^2"\n')
+        file.write("ramp = [{ frame = 0, amount = 0.0 }, { frame = 10, amount = 1.0 }]\n")
+    words = ["run", str(scene), "--quiet", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "facts.json")]
+    assert cli.main(words) == cli.DONE
+    checks = json.loads((tmp_path / "facts.json").read_text())["second_check"]["checks"]
+    (carried,) = (one for one in checks if one["name"] == "forces that bones do not carry")
+    assert carried["met"]
+    assert carried["allowed"] < 1e-5
+
+
+@pytest.mark.slow
 def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     scene, out = small.write(tmp_path / "bar"), tmp_path / "out"
