@@ -67,9 +67,7 @@ class Bundle:
         self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
 
     def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
-        """The points (k, p, 3) [mm] and radii (k, p) [mm] that are wanted in place of the present ones, with
-        ``frames`` (k, p, 3, 3).
-        """
+        """The wanted points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
         now = (points - self.middle).swapaxes(0, 1)
         parts = now[..., None] * self.sections[..., None, :]
         parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)

@@ -40,5 +40,6 @@ def test_the_rows_are_those_of_the_report() -> None:
         ("ARAP", "Surface model", "++", "?"),
         ("PBD", "Surface model", "++", "?"),
         ("Implicit RBF", "Implicit surface", "", ""),  # ours: its goal in section 7.1
+        ("VIPER", "Bundle of rods", "", ""),  # ours: a decomposition of section 6.1.2
     ]
     assert solver_table.report_speeds()["gluteus_medius"].per_second == 57.12  # Table 6.1
