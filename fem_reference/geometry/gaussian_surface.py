@@ -14,6 +14,8 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 
 # Points inside the surface from which the first centres are made, and vertices that the fit looks at.
 _INSIDE, _SAMPLES = 20_000, 1500
+# The distance of points beside the surface, over the edge of a cube of the same volume.
+_BESIDE = 0.05
 # Each round of the fit knows how fast the level falls at the samples, from the round before.
 _ROUNDS, _STEPS = 6, 8
 # The least and the greatest radius, over the edge of a cube of the same volume.
@@ -64,13 +66,19 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")
-    volume = enclosed_volume(surface.points, surface.triangles)
-    beside, bounds = 0.05 * np.cbrt(volume), np.log(np.array(_RADII) * np.cbrt(volume))
-    inside = _inside(surface, volume)
+    middle, size = surface.points.mean(axis=0), float(np.cbrt(enclosed_volume(surface.points, surface.triangles)))
+    axes = _axes(surface.points - middle)
+    found = _fit(surface.moved_to((surface.points - middle) @ axes.T / size), count)
+    return GaussianSurface(size * found.centres @ axes + middle, size * found.radii)
+
+
+def _fit(surface: Surface, count: int) -> GaussianSurface:
+    """The fit to a ``surface`` along its principal axes, of volume 1."""
+    bounds, inside = np.log(_RADII), _inside(surface)
     centres, found = kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
     squares = np.bincount(found, ((inside - centres[found]) ** 2).sum(axis=1), count)
     spread = np.maximum(squares / np.maximum(np.bincount(found, minlength=count), 1), 1.01 * np.exp(2 * bounds[0]))
-    samples, distances = _samples(surface, beside)
+    samples, distances = _samples(surface)
     unknowns = np.concatenate([centres.ravel(), np.log(1.2 * np.sqrt(spread))])
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     within = tuple(
@@ -86,7 +94,7 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
             bounds=within,
             x_scale="jac",
             loss="soft_l1",
-            f_scale=beside,
+            f_scale=_BESIDE,
             max_nfev=_STEPS,
         ).x
     return _surface(unknowns)
@@ -116,23 +124,26 @@ def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
     return np.hstack([by_centre.reshape(len(points), -1), weights * (away**2).sum(axis=2)])
 
 
-def _samples(surface: Surface, beside: float) -> tuple[Floats, Floats]:
-    """Points (k, 3): vertices and those ``beside`` them [mm] on both sides; and their distances (k,) from the surface."""
+def _samples(surface: Surface) -> tuple[Floats, Floats]:
+    """Points (k, 3): vertices and those beside them on both sides; and their distances (k,) from the surface."""
     some = farthest_points(surface.points, _SAMPLES)
     points, normals = surface.points[some], igl.per_vertex_normals(surface.points, surface.triangles)[some]
-    sides = np.array([0.0, beside, -beside])
+    sides = np.array([0.0, _BESIDE, -_BESIDE])
     return np.concatenate([points - side * normals for side in sides]), np.repeat(sides, len(some))
 
 
-def _inside(surface: Surface, volume: float) -> Floats:
-    """Nodes (k, 3) of a cubic grid along the principal axes that are inside."""
-    middle = surface.points.mean(axis=0)
-    axes = np.linalg.svd(surface.points - middle, full_matrices=False)[2]
-    tails = (((surface.points - middle) @ axes.T) ** 3).sum(axis=0)
-    axes[tails < 0] *= -1
-    local, step = (surface.points - middle) @ axes.T, float(np.cbrt(volume / _INSIDE))
-    ticks = [
-        np.arange(low + step / 2, high, step) for low, high in zip(local.min(axis=0), local.max(axis=0), strict=True)
-    ]
-    nodes = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3) @ axes + middle
+def _axes(away: Floats) -> Floats:
+    """The principal axes (3, 3) of points ``away`` (n, 3) from their mean, right-handed, the first two towards the longer tail."""
+    axes = np.linalg.svd(away, full_matrices=False)[2]
+    first, second = np.where(((away @ axes[:2].T) ** 3).sum(axis=0)[:, None] < 0, -axes[:2], axes[:2])
+    return np.stack([first, second, np.cross(first, second)])
+
+
+def _inside(surface: Surface) -> Floats:
+    """Points (k, 3) inside, near the nodes of a cubic grid: on them, rounding would decide which of its nodes are equally far."""
+    step = float(np.cbrt(1 / _INSIDE))
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    ticks = [np.arange(start + step / 2, end, step) for start, end in zip(low, high, strict=True)]
+    nodes = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes += step * np.random.default_rng(0).uniform(-0.1, 0.1, nodes.shape)
     return np.asarray(nodes[igl.fast_winding_number(surface.points, surface.triangles, nodes) > 0.5])

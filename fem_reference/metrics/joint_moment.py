@@ -14,12 +14,15 @@ from fem_reference.problems.setup import Joint
 from fem_reference.runs.store import Run
 
 STATISTICS = {
-    "moment": Statistic("N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26}),
+    "moment": Statistic(
+        "N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26, "rank": 50}
+    ),
     "force": Statistic(
         "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27}
     ),
 }
 OF, AGAINST = "lines", "reference"
+_LEAST = 1e-6  # of the greatest force, below which a force is round-off and has no arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
@@ -33,6 +36,17 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
         expected = 0.0 if reference.solver == "rest" else _values(reference, joint)
         found[:, which == i] = (_values(run, joint) - expected)[:, which == i]
     return measures("joint_moment", dict(zip(STATISTICS, found, strict=True)))
+
+
+def force_arms(run: Run, joint: Joint) -> Floats:
+    """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN where there is none.
+
+    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, virtual work
+    makes it the mean of ``-dl/dtheta`` of what pulls, each with its share of the resultant.
+    """
+    moment, force = _values(run, joint)
+    known = force > _LEAST * force.max(initial=0.0)
+    return np.divide(moment, force, out=np.full(len(force), np.nan), where=known)
 
 
 def _has_force(run: Run, joint: Joint) -> bool:

@@ -1,22 +1,27 @@
 """Forces and moments at the joint: statics by hand, virtual work, and what has no force."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import shapes
 import small
 from numpy.testing import assert_allclose
 from scipy.integrate import simpson
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines, Surface
+from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.foundations.motion import Rotation
+from fem_reference.io import files
 from fem_reference.metrics import MeasurementContext, at_rest, context_of, find, measure
+from fem_reference.metrics.joint_moment import force_arms
 from fem_reference.problems.of_case import setup
 from fem_reference.problems.setup import Bone, Joint
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.studies import workflow
+from tests.metrics import test_moment_arm as lines
 
 BALL = Surface(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -25,18 +30,22 @@ FORCES = np.array([[0.0, 0, 0], [0, 3, 4], [0, 6, 8]])
 POINT, CENTRE, AXIS = np.array([7.0, 10, 0]), np.array([1.0, 2, 0]), np.array([1.0, 0, 0])
 
 
-def pulled(forces: np.ndarray = FORCES) -> Run:
-    """A run whose muscle pulls the femur at ``POINT``."""
-    kinds = {"force": forces, "moment": np.cross(POINT, forces)}
-    scalars = {
+def scalars_of(forces: Floats, places: Floats = POINT) -> dict[str, Floats]:
+    """What a run has of ``forces`` (f, 3) on the femur at ``places``."""
+    kinds = {"force": forces, "moment": np.cross(places, forces)}
+    return {
         name: np.array(values)
         for kind, vectors in kinds.items()
         for name, values in zip(vector_scalars(f"{kind}_on_femur", np.zeros(3)), vectors.T, strict=True)
     }
-    lines = Polylines(np.array([[0.0, 0, 0], [0, 0, 9]]), np.array([0, 2]))
-    moved = np.broadcast_to(lines.points, (3, 2, 3))
+
+
+def pulled(forces: np.ndarray = FORCES) -> Run:
+    """A run whose muscle pulls the femur at ``POINT``."""
+    fibres = Polylines(np.array([[0.0, 0, 0], [0, 0, 9]]), np.array([0, 2]))
+    moved = np.broadcast_to(fibres.points, (3, 2, 3))
     still = np.broadcast_to(BALL.points, (3, 4, 3))
-    return Run("run", "fenicsx", Outcome("converged", ""), (0, 1, 2), BALL, still, lines, moved, scalars)
+    return Run("run", "fenicsx", Outcome("converged", ""), (0, 1, 2), BALL, still, fibres, moved, scalars_of(forces))
 
 
 def context(run: Run, angles: tuple[float, ...] = (0.0, 0.1, 0.2)) -> MeasurementContext:
@@ -116,3 +125,48 @@ def test_forces_on_all_bones_balance(bar: tuple[Run, MeasurementContext]) -> Non
 def test_a_case_without_a_joint_has_no_moment() -> None:
     run = pulled()
     assert measure(run, at_rest(run), replace(context(run), joints=()), ["joint_moment"]) == ()
+
+
+def test_the_force_arm_of_a_straight_bar_is_its_excursion_arm() -> None:
+    """A line pulls the bone that turns straight towards a fixed point: 0.1 % with a degree between frames, as excursion has it."""
+    joint = lines.joint_of(np.radians(np.arange(40)))
+    run = lines.straight(joint, 40)
+    assert run.fibre_positions is not None
+    for fibre in (0, 1):
+        start, end = (run.fibre_positions[:, 2 * fibre + i] for i in (0, 1))
+        away = np.linalg.norm(start - end, axis=1)[:, None]
+        pull = (start - end) / away * (away - 10)  # a law of the length
+        pulling = replace(run, scalars=scalars_of(pull, end))
+        arms = lines.arms_of(run, lines.context_of(joint, run))[:, fibre]
+        assert_allclose(force_arms(pulling, joint), arms, rtol=1e-3)
+        off = replace(joint, centre=joint.centre + [0, 1, 0])
+        assert np.abs(force_arms(pulling, off) / arms - 1).max() > 0.01
+
+
+def test_without_a_force_there_is_no_arm() -> None:
+    run = pulled()
+    arms = force_arms(run, context(run).joints[0])
+    assert np.isnan(arms[0])
+    assert_allclose(arms[1:], 32 / 5)
+
+
+def test_a_greater_scene_has_forces_and_moments_to_scale(tmp_path: Path) -> None:
+    """No law has a length: all lengths ten times give arms ten times, forces 100 times and moments 1000 times.
+
+    Of a box, whose tetrahedra do not depend on its size. The solver ends at a residual of 1e-4, its square in what follows.
+    """
+    found = []
+    for unit in ("mm", "cm"):
+        folder = small.write(tmp_path / unit)
+        box = shapes.skin(shapes.box((4, 4, 12), (10, 10, 40)))
+        files.write_surface(folder / "bar.vtp", box, box.points)
+        scene = (folder / "case.toml").read_text().replace('mm"', f'{unit}"')
+        (folder / "case.toml").write_text(scene.replace("tet_size", 'mesher = "block"\ntet_size'))
+        case = workflow.load_case(folder, {"frames.last": 10, "frames.every": 5})
+        run = workflow.solve(case, store=folder / "store")
+        given = context_of(setup(case), run)
+        moment, force = measure(run, at_rest(run), given, ["joint_moment"])
+        found.append((force_arms(run, given.joints[0])[1:], force.values[1:], moment.values[1:], run.force("lid")[1:]))
+    for less, great, power in zip(*found, (1, 2, 3, 2), strict=True):
+        assert np.abs(less).max() > 0.01
+        assert_allclose(great, 10**power * less, rtol=1e-6, atol=1e-9 * 10**power)

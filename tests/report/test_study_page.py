@@ -51,6 +51,17 @@ def test_the_price_of_half_the_error_is_said_in_a_sentence() -> None:
     assert said[2] == "Below 4 mm, the best of pbd, only the reference gets."
 
 
+def test_what_a_case_has_not_has_no_front() -> None:
+    """Moment arms, where the solvers have them; one point alone, the others without a force, is no front."""
+    case = study()
+    assert study_page.shown(case) == list(UNITS)
+    arms = replace(case, points=tuple(replace(one, errors=one.errors | {"moment_arm.rms": 3.0}) for one in case.points))
+    assert study_page.shown(arms) == [*UNITS, "moment_arm.rms"]
+    first, *others = case.points
+    forced = replace(first, errors=first.errors | {"joint_moment.moment": 5.0})
+    assert study_page.shown(replace(case, points=(forced, *others))) == list(UNITS)
+
+
 def test_half_an_error_that_no_setting_reached_would_cost() -> None:
     case = study()
     some = replace(case, points=tuple(one for one in case.points if one.solver == "pbd" and one.value in ("4", "8")))
@@ -208,7 +219,7 @@ def test_at_most_means_the_same_on_the_page_of_the_study(own_bar: float) -> None
 
 def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     case = own_study(features(50), bar=2.0)
-    case = replace(case, units=case.units | dict.fromkeys(study_page.SHOWN, "mm"))
+    case = replace(case, units=case.units | dict.fromkeys(study_page.shown(case), "mm"))
     text = study_page.page(Study((case,))).html()
     table = text[text.index("The same surface deviation, rms: time of a frame") :]
     plain = html.unescape(re.sub(r"<[^>]+>", "", table)).replace("\N{NARROW NO-BREAK SPACE}", " ")

@@ -13,14 +13,19 @@ import pytest
 import shapes
 import small
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference.cli import main
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines
+from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
+<<<<<<< HEAD
 from fem_reference.problems.setup import Bone, Joint
+=======
+from fem_reference.problems.setup import AttachedVertices, Bone
+>>>>>>> hC
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -477,6 +482,54 @@ def test_what_turns_as_a_whole_turns_its_forces() -> None:
     assert np.abs(first).max() > 1
     assert_allclose(force, turn[:3, :3] @ first, rtol=1e-9, atol=1e-9)
     assert_allclose(turned, turn[:3, :3] @ moment + np.cross(turn[:3, 3], force), rtol=1e-9, atol=1e-7)
+
+
+def alike(given: MuscleProblem, turn: np.ndarray, shift: np.ndarray, factor: float, order: np.ndarray) -> MuscleProblem:
+    """The problem turned, moved and ``factor`` times as great, with the vertices of its surface in another ``order``."""
+
+    def there(points: np.ndarray) -> np.ndarray:
+        return factor * points @ turn.T + shift
+
+    def moved(bone: Bone) -> Bone:
+        motion = bone.motion
+        if isinstance(motion, Rotation):
+            axis, (x, y, z) = turn @ motion.axis, there(np.array(motion.centre))
+            motion = replace(motion, axis=tuple(axis), centre=(x, y, z))
+        return replace(bone, surface=bone.surface.moved_to(there(bone.surface.points)), motion=motion)
+
+    back, bones = np.argsort(order), {bone.name: moved(bone) for bone in given.bones}
+    surface = Surface(there(given.surface.points[order]), back[given.surface.triangles])
+    attached = tuple(
+        AttachedVertices(one.attachment, bones[one.bone.name], np.sort(back[one.vertices])) for one in given.attached
+    )
+    fibres = Polylines(there(given.fibres.points), given.fibres.offsets)
+    return replace(given, surface=surface, bones=tuple(bones.values()), attached=attached, fibres=fibres)
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+def test_a_scene_turned_moved_scaled_and_renumbered_has_the_same_arms_forces_and_moments(obstacle) -> None:
+    """Lengths and arms to scale, forces as its square (so is F0), moments as its cube; turned as the scene is."""
+    given, factor, shift = bar(PULLED), 2.5, np.array([30.0, -50, 7])
+    turn = Turn.random(rng=np.random.default_rng(3)).as_matrix()
+    order = np.random.default_rng(4).permutation(len(given.surface.points))
+    other = alike(given, turn, shift, factor, order)
+    great = {key: dict(value) if isinstance(value, dict) else value for key, value in obstacle.items()}
+    for kind in {"sphere", "cylinder"} & {*great}:
+        shape = great[kind]
+        for key in {"centre", "start", "end"} & {*shape}:
+            place = np.array([float(one) for one in shape[key].removesuffix(" mm").split(",")])
+            shape[key] = ", ".join(repr(float(one)) for one in factor * turn @ place + shift) + " mm"
+        shape["radius"] = f"{factor * float(shape['radius'].removesuffix(' mm'))} mm"
+    stronger = HILL | {"max_force": f"{500 * factor**2} N"}
+    (_, small_one), (_, frames) = solved(given, hill=HILL, **obstacle), solved(other, hill=stronger, **great)
+    assert_allclose(lengths(other, frames), factor * lengths(given, small_one), rtol=1e-9)
+    for one, frame in zip(small_one[1:], frames[1:], strict=True):
+        assert_allclose(frame.scalars["muscle_force"], factor**2 * one.scalars["muscle_force"], rtol=1e-6)
+        (less, about), (force, moment) = exerted(one, "top"), exerted(frame, "top")
+        size = np.linalg.norm(less)
+        assert size > 1
+        assert_allclose(force, factor**2 * turn @ less, atol=1e-6 * factor**2 * size)
+        assert_allclose(moment - np.cross(shift, force), factor**3 * turn @ about, atol=1e-4 * factor**3 * size)
 
 
 def test_lines_without_hill_have_no_force() -> None:

@@ -1,8 +1,9 @@
 """A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
 
 Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0; velocities of shortening are positive,
-as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), the structure is Zajac's (1989), and the hyperbola (5.1)
-is Hill's: its constants follow from a / F0 and the greatest velocity, ``b = a / F0 vmax``.
+as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
+the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's: its constants follow from a / F0 and the greatest velocity,
+``b = a / F0 vmax``. Unlike in Thelen's model, activation leaves the greatest velocity as it is.
 """
 
 import math
@@ -22,10 +23,13 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 # Thelen 2003, young adults: width of the active curve; shape of the passive one and its strain at F0; the strain of the tendon at
 # F0; the greatest force of lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape; beyond it is linear (same place).
+# The tendon's toe ends at this share of F0, with this shape, at a strain from where a line of the same slope leads on (same place).
 _TOE, _TOE_SHAPE = 0.33, 3.0
-# Fibres are sought between these lengths; velocities are found to this share of F0.
-_SHORTEST, _LONGEST = 0.1, 3.0
+_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
+_TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
+# Fibres are sought between these lengths in steps of at most this; velocities are found to this share of F0.
+_SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
+_SLACK = 1e-9  # strain, below which round-off does not strain a tendon
 _LEAST = 1e-3  # activation, without which no velocity follows from a force
 
 
@@ -70,8 +74,10 @@ class Hill(Record):
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
             return 0.0, low
-        lengths = np.linspace(low, _LONGEST, 400)
-        pulls = np.array([self.imbalance(path, one, activation) for one in lengths]) > 0
+        high = min(self._fibre(path, -_SLACK), _LONGEST)
+        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # where the tendon pulls more than fibres can
+        lengths = np.linspace(low, high, 2 + int((high - low) / _STEP))
+        pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
             raise InputError(
@@ -80,6 +86,11 @@ class Hill(Record):
         bracket = lengths[found - 1], lengths[found]
         fibre = float(brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
         return self.max_force * self.tendon_force(path, fibre), fibre
+
+    def _fibre(self, path: float, strain: float) -> float:
+        """The fibre length [l0] at a ``strain`` of the tendon."""
+        along = (path - self.slack_length * (1 + strain)) / self.optimal_length
+        return math.hypot(max(along, 0.0), self.thickness)
 
     def velocity(self, path: float, fibre: float, activation: float) -> float:
         """The velocity of shortening [l0 / s] of fibres whose force is in equilibrium with the tendon's."""
@@ -147,35 +158,33 @@ def passive(fibre: float) -> float:
 
 def tendon(strain: float) -> float:
     """The force [F0] of the tendon: 0 where it is slack, an exponential toe, then linear with the same slope."""
-    toe = _toe_strain()
     if strain <= 0:
         return 0.0
-    if strain <= toe:
-        return _TOE * math.expm1(_TOE_SHAPE * strain / toe) / math.expm1(_TOE_SHAPE)
-    return _TOE + (1 - _TOE) * (strain - toe) / (_TENDON_STRAIN - toe)
+    if strain <= _TOE_STRAIN:
+        return _TOE * math.expm1(_TOE_SHAPE * strain / _TOE_STRAIN) / math.expm1(_TOE_SHAPE)
+    return _TOE + (1 - _TOE) * (strain - _TOE_STRAIN) / (_TENDON_STRAIN - _TOE_STRAIN)
 
 
-def _toe_strain() -> float:
-    """The strain at which toe and line have the same slope."""
-    slope = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times toe strain
-    return _TENDON_STRAIN * slope / (slope + 1 - _TOE)
+def _strain(force: float) -> float:
+    """The strain of the tendon at a ``force`` [F0] beyond its toe."""
+    return _TOE_STRAIN + (force - _TOE) / (1 - _TOE) * (_TENDON_STRAIN - _TOE_STRAIN)
 
 
 def hyperbola(velocity: float, curvature: float) -> float:
     """The force, as a share of the isometric one, at a ``velocity`` of shortening as a share of the greatest: (5.1) solved for F.
 
-    Lengthening (negative) it rises to 1.4 by a hyperbola with the same slope at 0 (Katz 1939).
+    Lengthening (negative) it rises to 1.4 by a hyperbola that is twice as steep at 0 (Thelen 2003).
     """
     if velocity >= 0:
         return (1 - velocity) / (1 + velocity / curvature)
     rise = _LENGTHENING - 1
-    slope = 1 + 1 / curvature
+    slope = 2 * (1 + 1 / curvature)
     return 1 + rise * slope * -velocity / (rise + slope * -velocity)
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
     """The velocity of shortening, as a share of the greatest, at a ``force``; beyond the hyperbola's ends along its tangents."""
-    slope, rise = 1 + 1 / curvature, _LENGTHENING - 1
+    slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortens faster than without load
         return 1 - force * (1 + 1 / curvature)
     if force <= 1:
