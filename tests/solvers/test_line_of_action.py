@@ -21,11 +21,7 @@ from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
-<<<<<<< HEAD
-from fem_reference.problems.setup import Bone, Joint
-=======
-from fem_reference.problems.setup import AttachedVertices, Bone
->>>>>>> hC
+from fem_reference.problems.setup import AttachedVertices, Bone, Joint
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
