@@ -15,10 +15,15 @@ from fem_reference.runs.store import Run
 
 STATISTICS = {
     "moment": Statistic(
-        "N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26, "rank": 50}
+        "N mm",
+        "Joint",
+        "moment",
+        curve="Moment of the muscle about the joint",
+        of_joint=True,
+        shown={"curve": 26, "rank": 50},
     ),
     "force": Statistic(
-        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27}
+        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", of_joint=True, shown={"curve": 27}
     ),
 }
 OF, AGAINST = "lines", "reference"

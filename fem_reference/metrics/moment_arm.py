@@ -18,7 +18,9 @@ from fem_reference.runs.store import Run
 
 _TITLE = "Moment arm"
 STATISTICS = {
-    "mean": Statistic("mm", _TITLE, "mean", curve="Moment arm, mean over the fibres", shown={"curve": 25}, local=True),
+    "mean": Statistic(
+        "mm", _TITLE, "mean", curve="Moment arm, mean over the fibres", shown={"curve": 25}, local=True, of_joint=True
+    ),
     "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 35, "rank": 40}, local=True),
     "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 35}, local=True, lone=True),
 }

@@ -1,12 +1,16 @@
-"""Curves over frames for the page of a comparison."""
+"""Curves over frames, and over the angles of joints, for the page of a comparison."""
+
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike, NDArray
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, described, find
+from fem_reference.metrics import Measure, MeasurementContext, described, find
+from fem_reference.metrics.moment_arm import turning
 from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, colour_of, over_frames, plain_numbers
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
@@ -24,8 +28,34 @@ _STATISTICS = (
 def curves(comparison: Comparison) -> list[Drawing]:
     """Every drawing for which the comparison has numbers."""
     found = [_surface(comparison, i) for i in range(len(comparison.candidates))]
-    found += [_of_runs(comparison, *key, one.curve) for key, one in described("curve").items()]
+    frames = _Along(
+        "frame", np.array(comparison.reference.numbers, float), np.ones(len(comparison.reference.numbers), bool)
+    )
+    for key, one in described("curve").items():
+        places = [frames, *(_angles(comparison) if one.of_joint else [])]
+        found += [_of_runs(comparison, *key, one.curve, along) for along in places]
     return [drawing for drawing in [*found, _inversion(comparison)] if drawing is not None]
+
+
+class _Along(NamedTuple):
+    """What a curve goes along: a ``name``, and by frame a ``place`` (f,) and the mask (f,) of those that count."""
+
+    name: str
+    places: Floats
+    kept: NDArray[np.bool_]
+
+
+def _angles(comparison: Comparison) -> list[_Along]:
+    """The angle [deg] of each joint, at the frames about which it turns alone."""
+    context, numbers = comparison.context, comparison.reference.numbers
+    if not isinstance(context, MeasurementContext) or len(numbers) < 2:
+        return []
+    which = turning(context.joints, context, numbers)
+    return [
+        _Along(f"angle of {joint.name} [deg]", np.degrees(joint.angles(numbers)), which == i)
+        for i, joint in enumerate(context.joints)
+        if (which == i).any()
+    ]
 
 
 def label_of(inverted: Measure) -> str:
@@ -33,8 +63,8 @@ def label_of(inverted: Measure) -> str:
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
-def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) -> Drawing | None:
-    """A measure of every run from rest, with the error bar of the reference; None where no run has it."""
+def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str, along: _Along) -> Drawing | None:
+    """A measure of every run from rest ``along`` something, with the error bar of the reference; None where no run has it."""
     measures = {run.name: find(comparison.changes[run.name], metric, statistic) for run in comparison.runs}
     found = {run: measure for run, measure in measures.items() if measure is not None}
 
@@ -43,10 +73,15 @@ def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) ->
             if run.name in found:
                 colour = colour_of(i)
                 if i == 0:
-                    _band(axes, comparison, "change", found[run.name], found[run.name].values)
-                _line(axes, run.numbers, found[run.name], run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
+                    _band(axes, comparison, "change", found[run.name], found[run.name].values, along=along)
+                values, wide = found[run.name].values[along.kept], 2.4 if i == 0 else 1.5
+                _line(axes, along.places[along.kept], values, run.name, color=colour, linewidth=wide)
 
-    return over_frames(f"{metric}-{statistic}", title, next(iter(found.values())).unit, draw) if found else None
+    if not found:
+        return None
+    over = "" if along.name == "frame" else f", over the {along.name.removesuffix(' [deg]')}"
+    unit = next(iter(found.values())).unit
+    return over_frames(f"{metric}-{statistic}{over}", title + over, unit, draw, along=along.name)
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
@@ -73,7 +108,7 @@ def _surface(comparison: Comparison, i: int) -> Drawing | None:
         for measure, label, style in found:
             if measure is not None:
                 _band(axes, comparison, "deviation", measure, np.zeros(len(run.numbers)), style)
-                _line(axes, run.numbers, measure, label, color=colour_of(i + 1), linestyle=style)
+                _line(axes, run.numbers, measure.values, label, color=colour_of(i + 1), linestyle=style)
         if far:
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)
@@ -89,7 +124,7 @@ def _inversion(comparison: Comparison) -> Drawing | None:
     def draw(axes: Axes) -> None:
         for measure, style in zip(measures, ("-", "--", ":", "-.") * len(measures), strict=False):
             label = label_of(measure) or "det F"
-            _line(axes, reference.numbers, measure, label, color=REFERENCE, linestyle=style)
+            _line(axes, reference.numbers, measure.values, label, color=REFERENCE, linestyle=style)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
     title = "Smallest det F of the reference (inside out below 0)"
@@ -97,23 +132,31 @@ def _inversion(comparison: Comparison) -> Drawing | None:
 
 
 def _band(
-    axes: Axes, comparison: Comparison, of: Of, measure: Measure, middle: Floats, linestyle: str | None = None
+    axes: Axes,
+    comparison: Comparison,
+    of: Of,
+    measure: Measure,
+    middle: Floats,
+    linestyle: str | None = None,
+    along: _Along | None = None,
 ) -> None:
     """Error bars of the reference, around ``middle`` (f,), where that is stated; with a ``linestyle`` its upper edge too."""
     bars = comparison.error_bars
     bar = bars and bars.find(of, measure.metric, measure.statistic)
     if not bar:
         return
-    numbers, upper = np.asarray(comparison.reference.numbers), middle + bar.values
+    numbers, lower, upper = np.asarray(comparison.reference.numbers), middle - bar.values, middle + bar.values
+    if along is not None:
+        numbers, lower, upper = (values[along.kept] for values in (along.places, lower, upper))
     labelled = _KNOWN in axes.get_legend_handles_labels()[1]
-    axes.fill_between(numbers, middle - bar.values, upper, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
+    axes.fill_between(numbers, lower, upper, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
     if linestyle:
         axes.plot(numbers, upper, color="#888888", linewidth=1.0, linestyle=linestyle)
 
 
-def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **look: str | float) -> None:
-    """A measure over frames; a cross on the frame axis where it is not finite."""
-    frames, values = np.asarray(numbers), np.asarray(measure.values, float)
+def _line(axes: Axes, numbers: ArrayLike, found: Floats, label: str, **look: str | float) -> None:
+    """A measure over frames or angles; a cross on their axis where it is not finite."""
+    frames, values = np.asarray(numbers), np.asarray(found, float)
     bad = ~np.isfinite(values)
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]
     if bad.any():

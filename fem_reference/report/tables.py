@@ -24,13 +24,13 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
-    with the inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest`` the
+    with the forces and inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest`` the
     change from rest of every run; ``error_bars`` the error bars of the reference and ``rankings`` the solvers that they separate,
     both empty without bars.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
-    from_rest = {run.name: rows(run, comparison.changes[run.name]) for run in comparison.runs}
+    from_rest = {run.name: rows(run, (*comparison.changes[run.name], *exerted(run))) for run in comparison.runs}
     facts = {
         "case": comparison.scene.name,
         "solver": reference.solver,
@@ -82,6 +82,17 @@ def inversion(run: Run) -> tuple[Measure, ...]:
     """The smallest det F per frame [1] that a solver recorded (scalars ``min_det_F...``), as measures."""
     names = [name for name in run.scalars if name.startswith("min_det_F")]
     return tuple(Measure("inversion", name, "1", run.scalars[name]) for name in names)
+
+
+def exerted(run: Run) -> tuple[Measure, ...]:
+    """The components of forces [N] and of moments about the origin [N mm] on each bone that a solver recorded, as measures."""
+    units = {"force_on_": "N", "moment_on_": "N mm"}
+    return tuple(
+        Measure(f"{kind}bone", name.removeprefix(kind), unit, values)
+        for kind, unit in units.items()
+        for name, values in run.scalars.items()
+        if name.startswith(kind)
+    )
 
 
 def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
