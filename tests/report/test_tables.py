@@ -5,10 +5,25 @@ import io
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fem_reference import report
 from fem_reference.report.tables import COLUMNS
+
+
+def test_forces_are_rows_of_the_run_that_recorded_them(comparison):
+    scalars = {
+        f"{kind}_on_plate_{axis}": np.full(5, i + 0.5) for kind in ("force", "moment") for i, axis in enumerate("xyz")
+    }
+    quick = replace(comparison.candidates[0], scalars=scalars)
+    reference = replace(comparison.reference, scalars={**comparison.reference.scalars, **scalars})
+    printed = report.summary(replace(comparison, reference=reference, candidates=(quick, comparison.candidates[1])))
+    found = [row for row in printed["from_rest"] if row["metric"].endswith("_on_bone") and row["frame"] == 20]
+    assert {row["candidate"] for row in found} == {"reference", "quick"}
+    wanted = {("force_on_bone", "plate_y", 1.5, "N"), ("moment_on_bone", "plate_z", 2.5, "N mm")}
+    assert wanted <= {(row["metric"], row["statistic"], row["value"], row["unit"]) for row in found}
+    assert len([row for row in printed["measures"] if row["metric"] == "force_on_bone"]) == 3 * 5
 
 
 def test_summary_has_the_documented_keys_and_survives_json(comparison):
