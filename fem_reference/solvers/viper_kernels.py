@@ -1,7 +1,7 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
-Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p - 1, 4), unit quaternions (w, x, y, z)
-that take each segment's frame from rest. The ends' points and turns are given by bones, all others are free.
+Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p + 1, 4), unit quaternions (w, x, y, z)
+that take each segment's frame from rest, between those of the two bones. Bones give the ends' points, all others are free.
 
 All constraints of a kind are projected at once, after Jacobi, each by no more than keeps the sum of its neighbours' steps from
 overshooting. Where constraints contradict each other the limit is the least sum of squares, whatever the order of points.
@@ -49,14 +49,15 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]
-    step = stiffness / 8 * (turned(turns, tangents) - np.diff(points, axis=1) / lengths)
+    step = stiffness / 8 * (turned(u, tangents) - np.diff(points, axis=1) / lengths)
     points[:, 1:-1] -= np.diff(lengths * step, axis=1)
-    u += 2 * product(pure(step[:, 1:-1]), product(u, pure(tangents[:, 1:-1])))
+    u += 2 * product(pure(step), product(u, pure(tangents)))
     u[:] = unit(u)
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments: they bend and twist as little as they can.
+    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of the outer ones and bones: they bend and twist as
+    little as they can.
 
     The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: what is curved at rest remains so.
     """
