@@ -4,9 +4,10 @@ Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each a
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
 stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
 
-Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is neither mass nor time: a frame number begins
-with the one before, moved by a blend of the bones, and stiffnesses are shares of an error, as in ``pbd``. Every rod has one radius
-at rest, such that all together have the muscle's volume. Only rods keep their volume; the surface that they carry may not.
+Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is
+neither mass nor time: a frame number begins with the one before, moved by a blend of the bones, and stiffnesses are shares of an
+error, as in ``pbd``: the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
+volume. Only rods keep their volume; the surface that they carry may not.
 """
 
 from typing import Annotated
