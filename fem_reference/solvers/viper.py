@@ -30,7 +30,15 @@ from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 from fem_reference.solvers.line_of_action import along, nearest_bones
 from fem_reference.solvers.pbd import Stiffness
-from fem_reference.solvers.viper_kernels import product, project_bend, project_stretch, project_volume, unit, volumes
+from fem_reference.solvers.viper_kernels import (
+    matrices,
+    product,
+    project_bend,
+    project_stretch,
+    project_volume,
+    unit,
+    volumes,
+)
 
 # Neighbours of a rod in its bundle, and points of rods that carry a vertex.
 _AROUND, _CARRIERS = 6, 12
@@ -131,7 +139,8 @@ class Rods:
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)
         for _ in range(self.settings.iterations):
-            self._sweep()
+            if np.isfinite(self.points).all() and np.isfinite(self.radii).all():
+                self._sweep()
         self._carry(number)
 
     def _begin(self, number: int) -> None:
@@ -173,9 +182,7 @@ class Rods:
         """The rotation (k, p, 3, 3) at each point, in the middle between those of its segments."""
         before, after = self.turns[:, :-1], self.turns[:, 1:]
         sign = np.where(np.sum(before * after, axis=2, keepdims=True) < 0, -1.0, 1.0)
-        found = unit(before + sign * after)
-        matrices = Rotation.from_quat(found.reshape(-1, 4), scalar_first=True).as_matrix()
-        return np.asarray(matrices.reshape(*found.shape[:2], 3, 3))
+        return matrices(unit(before + sign * after))
 
     def _carry(self, number: int) -> None:
         """Move surface and fibres with the rods, each point of which turns and scales what is around it."""

@@ -11,6 +11,8 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 
+_TINY = np.finfo(float).tiny
+
 
 def product(p: Floats, q: Floats) -> Floats:
     """Products (..., 4) of quaternions."""
@@ -37,7 +39,12 @@ def turned(turns: Floats, vectors: Floats) -> Floats:
 
 def unit(quaternions: Floats) -> Floats:
     """The ``quaternions`` (..., 4) divided by their norm."""
-    return np.asarray(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True))
+    return np.asarray(quaternions / np.maximum(np.linalg.norm(quaternions, axis=-1, keepdims=True), _TINY))
+
+
+def matrices(turns: Floats) -> Floats:
+    """The rotations (..., 3, 3) of ``turns`` (..., 4); not-a-number where they are."""
+    return turned(turns[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: float) -> None:
@@ -84,9 +91,10 @@ def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest
     square = a * a + a * b + b * b
     # Slopes of C by the length and by both radii.
-    along, of_a, of_b = ratio / lengths, ratio * (2 * a + b) / square, ratio * (a + 2 * b) / square
+    cone = np.pi / 3 / rest
+    along, of_a, of_b = cone * square, cone * lengths * (2 * a + b), cone * lengths * (a + 2 * b)
     step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)
-    points[:, 1:-1] -= np.diff((step * along / lengths)[..., None] * steps, axis=1)
+    points[:, 1:-1] -= np.diff((step * along / np.maximum(lengths, _TINY))[..., None] * steps, axis=1)
     change = np.zeros_like(radii)
     change[:, :-1] += step * of_a
     change[:, 1:] += step * of_b

@@ -181,3 +181,15 @@ def test_a_muscle_without_attachments_is_refused() -> None:
     given = replace(bar(), attached=())
     with pytest.raises(InputError, match="without attachments"):
         viper.solve(given, viper.ViperSettings(**USUAL), list[object]().append)
+
+
+def test_a_start_at_one_point_is_no_exception_and_neither_is_what_is_no_number() -> None:
+    given = replace(bar(), start=lambda rest: np.tile(rest.mean(axis=0), (len(rest), 1)))
+    outcome = viper.solve(given, viper.ViperSettings(**USUAL), list[object]().append)
+    assert outcome.status == "converged"
+    model, number = viper.Rods(bar(), viper.ViperSettings(**USUAL)), 1
+    model.points[0, 3] = np.nan
+    model.move(number)
+    found = model.trouble()
+    assert found is not None
+    assert found.status == "diverged"

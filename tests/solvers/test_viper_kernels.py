@@ -19,6 +19,7 @@ def test_quaternions_are_those_of_scipy() -> None:
     both = Rotation.from_quat(kernels.product(p, q), scalar_first=True)
     assert_allclose(both.as_matrix(), (one * other).as_matrix(), atol=1e-12)
     assert_allclose(kernels.turned(p, v), one.apply(v), atol=1e-12)
+    assert_allclose(kernels.matrices(p), one.as_matrix(), atol=1e-12)
     assert_allclose(kernels.product(p, kernels.conjugate(p)), np.tile([1.0, 0, 0, 0], (7, 1)), atol=1e-12)
 
 
