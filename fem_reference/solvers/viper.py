@@ -4,9 +4,10 @@ Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each a
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
 stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
 
-Each fibre of the case is a rod, clamped at the bones nearest to its ends. There is neither mass nor time: a frame number begins
-with the one before, moved by a blend of the bones, and stiffnesses are shares of an error, as in ``pbd``. Every rod has one radius
-at rest, such that all together have the muscle's volume. Only rods keep their volume; the surface that they carry may not.
+Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is
+neither mass nor time: a frame number begins with the one before, moved by a blend of the bones, and stiffnesses are shares of an
+error, as in ``pbd``: the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
+volume. Only rods keep their volume; the surface that they carry may not.
 """
 
 from typing import Annotated
@@ -29,7 +30,15 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 from fem_reference.solvers.pbd import Stiffness
-from fem_reference.solvers.viper_kernels import product, project_bend, project_stretch, project_volume, unit, volumes
+from fem_reference.solvers.viper_kernels import (
+    matrices,
+    product,
+    project_bend,
+    project_stretch,
+    project_volume,
+    unit,
+    volumes,
+)
 
 # Neighbours of a rod in its bundle, and points of rods that carry a vertex.
 _AROUND, _CARRIERS = 6, 12
@@ -41,8 +50,8 @@ class ViperSettings(Record):
     radius away from bones, or what they have at rest, and the surface leaves bones; off where the key is omitted.
     """
 
-    points: Annotated[int, Field(ge=4), Trade((6, 12, 24))]
-    iterations: Annotated[int, Field(gt=0), Trade((3, 10, 30))]
+    points: Annotated[int, Field(ge=4), Trade((4, 6, 12))]
+    iterations: Annotated[int, Field(gt=0), Trade((5, 20, 80))]
     stretch: Stiffness
     bending: Stiffness
     volume: Stiffness
@@ -101,7 +110,7 @@ class Rods:
             problem.begin(rest.reshape(-1, 3)).reshape(rest.shape),
             np.full(rest.shape[:2], self.radius),
         )
-        self.turns = np.tile([1.0, 0.0, 0.0, 0.0], (*self.steps.shape[:2], 1))
+        self.turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(rest), settings.points + 1, 1))
         self.volumes = volumes(rest, self.radii)
         self.ends = [nearest_bones(problem, rest[:, end], "viper") for end in (0, -1)]
         self.last = problem.frames[0]
@@ -114,7 +123,7 @@ class Rods:
             self.skin_bones = colliding_bones(problem.bones, at, attached, 0.0)
         self.checks = surface_checks(problem.surface, problem.attached_vertices)
         free = settings.points - 2
-        self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free - 1) + 2))}
+        self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free + 1) + 2))}
 
     def _bones(self) -> list[CollidingBone]:
         """The bones that rods stay out of."""
@@ -130,12 +139,13 @@ class Rods:
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)
         for _ in range(self.settings.iterations):
-            self._sweep()
+            if np.isfinite(self.points).all() and np.isfinite(self.radii).all():
+                self._sweep()
         self._carry(number)
 
     def _begin(self, number: int) -> None:
         """Move rods as a blend of the bones at their ends, which are at their bones."""
-        share, between = (np.linspace(0, 1, self.settings.points - i)[:, None] for i in (0, 1))
+        share, between = (np.linspace(0, 1, self.settings.points + i)[:, None] for i in (0, 1))
         first, last = (self._moved(ends, number) for ends in self.ends)
         self.points = (1 - share) * first[0] + share * last[0]
         self.turns = unit((1 - between) * first[1] + between * last[1])
@@ -170,11 +180,9 @@ class Rods:
 
     def _frames(self) -> Floats:
         """The rotation (k, p, 3, 3) at each point, in the middle between those of its segments."""
-        turns = self.turns
-        sign = np.where(np.sum(turns[:, 1:] * turns[:, :-1], axis=2, keepdims=True) < 0, -1.0, 1.0)
-        found = np.concatenate([turns[:, :1], unit(turns[:, :-1] + sign * turns[:, 1:]), turns[:, -1:]], axis=1)
-        matrices = Rotation.from_quat(found.reshape(-1, 4), scalar_first=True).as_matrix()
-        return np.asarray(matrices.reshape(*found.shape[:2], 3, 3))
+        before, after = self.turns[:, :-1], self.turns[:, 1:]
+        sign = np.where(np.sum(before * after, axis=2, keepdims=True) < 0, -1.0, 1.0)
+        return matrices(unit(before + sign * after))
 
     def _carry(self, number: int) -> None:
         """Move surface and fibres with the rods, each point of which turns and scales what is around it."""
@@ -240,6 +248,6 @@ def solve(problem: MuscleProblem, settings: ViperSettings, sink: Sink) -> Outcom
     return follow(Rods(problem, settings), problem, sink)
 
 
-_USUAL = {"points": 12, "iterations": 10, "stretch": 1.0, "bending": 0.5, "volume": 1.0, "bundle": 0.5}
+_USUAL = {"points": 6, "iterations": 20, "stretch": 1.0, "bending": 0.1, "volume": 1.0, "bundle": 1.0}
 _TABLE = TableRow("VIPER", "viper", _USUAL | {"contact": True})
 SOLVES = (MuscleSolver(settings=ViperSettings, solve=solve, example=_USUAL, table=(_TABLE,), fibres=lambda _: True),)

@@ -1,7 +1,7 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
-Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p - 1, 4), unit quaternions (w, x, y, z)
-that take each segment's frame from rest. The ends' points and turns are given by bones, all others are free.
+Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p + 1, 4), unit quaternions (w, x, y, z)
+that take each segment's frame from rest, between those of the two bones. Bones give the ends' points, all others are free.
 
 All constraints of a kind are projected at once, after Jacobi, each by no more than keeps the sum of its neighbours' steps from
 overshooting. Where constraints contradict each other the limit is the least sum of squares, whatever the order of points.
@@ -10,6 +10,8 @@ overshooting. Where constraints contradict each other the limit is the least sum
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
+
+_TINY = np.finfo(float).tiny
 
 
 def product(p: Floats, q: Floats) -> Floats:
@@ -37,7 +39,12 @@ def turned(turns: Floats, vectors: Floats) -> Floats:
 
 def unit(quaternions: Floats) -> Floats:
     """The ``quaternions`` (..., 4) divided by their norm."""
-    return np.asarray(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True))
+    return np.asarray(quaternions / np.maximum(np.linalg.norm(quaternions, axis=-1, keepdims=True), _TINY))
+
+
+def matrices(turns: Floats) -> Floats:
+    """The rotations (..., 3, 3) of ``turns`` (..., 4); not-a-number where they are."""
+    return turned(turns[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: float) -> None:
@@ -49,14 +56,15 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]
-    step = stiffness / 8 * (turned(turns, tangents) - np.diff(points, axis=1) / lengths)
+    step = stiffness / 8 * (turned(u, tangents) - np.diff(points, axis=1) / lengths)
     points[:, 1:-1] -= np.diff(lengths * step, axis=1)
-    u += 2 * product(pure(step[:, 1:-1]), product(u, pure(tangents[:, 1:-1])))
+    u += 2 * product(pure(step), product(u, pure(tangents)))
     u[:] = unit(u)
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments: they bend and twist as little as they can.
+    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of the outer ones and bones: they bend and twist as
+    little as they can.
 
     The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: what is curved at rest remains so.
     """
@@ -83,9 +91,10 @@ def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest
     square = a * a + a * b + b * b
     # Slopes of C by the length and by both radii.
-    along, of_a, of_b = ratio / lengths, ratio * (2 * a + b) / square, ratio * (a + 2 * b) / square
+    cone = np.pi / 3 / rest
+    along, of_a, of_b = cone * square, cone * lengths * (2 * a + b), cone * lengths * (a + 2 * b)
     step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)
-    points[:, 1:-1] -= np.diff((step * along / lengths)[..., None] * steps, axis=1)
+    points[:, 1:-1] -= np.diff((step * along / np.maximum(lengths, _TINY))[..., None] * steps, axis=1)
     change = np.zeros_like(radii)
     change[:, :-1] += step * of_a
     change[:, 1:] += step * of_b
