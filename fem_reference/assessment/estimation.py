@@ -66,11 +66,26 @@ class DecompositionError:
 
 
 @dataclass(frozen=True)
+class AnswerChange:
+    """The change of the reference's answer with fibres of a ``source`` in place of those of ``against``: by ``metric.statistic``
+    the greatest over the frames, empty where a solution is missing (``status``); ``bars``: the error bars of the answer.
+    """
+
+    case: str
+    source: str
+    against: str
+    status: str
+    changes: dict[str, float]
+    bars: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Estimation:
-    """The errors of all techniques; ``missing``: by case, the reason of omission."""
+    """The errors of all techniques; ``missing``: by case, the reason of omission; ``answers``, where these were asked for."""
 
     curves: tuple[CurveError, ...]
     heights: tuple[HeightError, ...]
     fits: tuple[FitError, ...]
     missing: dict[str, str]
     decompositions: tuple[DecompositionError, ...] = ()
+    answers: tuple[AnswerChange, ...] = ()

@@ -36,11 +36,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
+    solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres (half an hour)"
+    parser.add_argument("--solve", action="store_true", help=solving)
     share(parser, "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
+    if options.solve and options.name != ESTIMATION:
+        raise InputError("page", f"--solve for {options.name}", f"it for {ESTIMATION} only")
     if options.name == TABLE:
         return _table(options)
     if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
@@ -100,10 +104,12 @@ def _claims(options: argparse.Namespace) -> int:
 def _estimation(options: argparse.Namespace) -> int:
     """The report's estimation techniques."""
     scenes = [casefile.read_muscle(case) for case in options.case or estimation.CASES]
-    found = estimation.estimate(scenes)
+    with fenicsx.shared():
+        found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
     printed = [estimation_page.said(found), *(f"left out: {case}: {why}" for case, why in found.missing.items())]
     page = estimation_page.page(found)
-    publish(options, _asked(scenes, options), page, estimation_page.facts(found), "\n".join(printed))
+    asked = _asked(scenes, options, [Part(("--solve",), "solved")] if options.solve else [])
+    publish(options, asked, page, estimation_page.facts(found), "\n".join(printed))
     return DONE
 
 

@@ -12,6 +12,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
 from fem_reference.io.texts import finite
+from fem_reference.metrics import Statistic, described
 from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 
@@ -26,12 +27,19 @@ def page(found: Estimation) -> Page:
     contents = {
         "found": found,
         "techniques": TECHNIQUES,
+        "answers": _columns(found),
         "fibres": by_fibres(found),
         "drawings": [_figure(), _curves(found), _blobs(), _fits(found)],
     }
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
     )
+
+
+def _columns(found: Estimation) -> dict[str, Statistic]:
+    """The statistics of answers that are known, by ``metric.statistic``."""
+    names = dict.fromkeys(name for one in found.answers for name in one.changes)
+    return {name: described()[metric, statistic] for name in names for metric, _, statistic in [name.partition(".")]}
 
 
 def said(found: Estimation) -> str:
@@ -49,11 +57,12 @@ def said(found: Estimation) -> str:
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    rows = {
-        name: [asdict(one) for one in getattr(found, name)] for name in ("curves", "heights", "fits", "decompositions")
-    }
+    names = ("curves", "heights", "fits", "decompositions", "answers")
+    rows = {name: [asdict(one) for one in getattr(found, name)] for name in names}
     for one in rows["heights"]:
         one["condition"] = finite(one["condition"])
+    for one in rows["answers"]:
+        one |= {key: {name: finite(value) for name, value in one[key].items()} for key in ("changes", "bars")}
     return {**rows, "missing": found.missing}
 
 

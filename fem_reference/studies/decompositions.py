@@ -1,21 +1,44 @@
-"""Decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings."""
+"""Decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings, and
+what the reference answers with each.
+"""
 
+import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem_reference.assessment.estimation import DecompositionError
+from fem_reference import effects
+from fem_reference.assessment.estimation import AnswerChange, DecompositionError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
 from fem_reference.geometry.fibres import NearestLine
 from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.metrics import context_of
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Run
 from fem_reference.scenes.fibres import Chmd, Fibres, KohoutKukacka, Traced
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies import refinement
+from fem_reference.studies.cost import greatest, known
+from fem_reference.studies.execution import Bench
 
+log = logging.getLogger(__name__)
+
+LAPLACE = "Laplace field"
+# The statistics of an answer that fibres may change, and the law of fibres in a case without one: that of hip_flexion.
+ANSWERS = (
+    "surface_deviation.rms",
+    "surface_deviation.max",
+    "fibre_length.max",
+    "volume.deviation",
+    "joint_moment.force",
+)
+PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS = 20, 20
 NEAR = 0.2  # two fibres that are nearer [mm] between their ends cross
 _ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
@@ -27,20 +50,52 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
     """Each source of fibres of a case against the Laplace field's and, where a file has some, against those."""
     found = {
         name: anatomy.lines_of(one, rest.surface, partial(muscle.filled, one, rest))[0]
-        for name, one in _variants(case).items()
+        for name, one in variants(case).items()
     }
-    for against in ("Laplace field", "file"):
+    for against in (LAPLACE, "file"):
         for source in (name for name in found if against in found and name != against):
             yield compared(case.name, rest.surface, (source, found[source]), (against, found[against]))
 
 
-def _variants(case: MuscleCase) -> dict[str, MuscleCase]:
+def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
+    """The reference's answer on a case with each source of fibres, beside that with the Laplace field's and its error bars. Lengths
+    are those of the Laplace field's lines, carried by each surface.
+    """
+    scenes = variants(case if any("fibre" in one.needs for one in case.effects) else _pulling(case))
+    if LAPLACE not in scenes:
+        return
+    log.info("%s: the reference with fibres of the Laplace field", case.name)
+    bench = Bench(scenes.pop(LAPLACE), store)
+    base = bench.reference()
+    bars = refinement.bars(bench, base, model=False) if base.outcome.status == "converged" else None
+    widths = {} if bars is None else known(bars)
+    for source, scene in scenes.items():
+        log.info("%s: the reference with fibres by %s", case.name, source)
+        run, found = Bench(scene, store).reference(), dict[str, float]()
+        if base.outcome.status == run.outcome.status == "converged":
+            context = context_of(bench.setup(), base)
+            found = greatest(_carrying(run), _carrying(base), context, {name.split(".")[0] for name in ANSWERS})
+        picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, widths))
+        yield AnswerChange(case.name, source, LAPLACE, run.outcome.status, *picked)
+
+
+def _pulling(case: MuscleCase) -> MuscleCase:
+    """The case with fibres that resist stretch."""
+    return case.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
+
+
+def _carrying(run: Run) -> Run:
+    """The run without fibres of its own: its surface carries those that are measured."""
+    return replace(run, fibres=None, fibre_positions=None)
+
+
+def variants(case: MuscleCase) -> dict[str, MuscleCase]:
     """The case with each source of fibres that it can have."""
     ends = list(case.fibres.ends.values()) or [one.name for one in case.attachment][:2]
     found: dict[str, Fibres] = {}
     if len(ends) == 2:
         start, end = ends
-        found["Laplace field"] = Fibres(traced=Traced(count=COUNT, start=start, end=end))
+        found[LAPLACE] = Fibres(traced=Traced(count=COUNT, start=start, end=end))
         template = KohoutKukacka(count=COUNT, start=start, end=end, contours=CONTOURS, template="parallel")
         found["Kohout and Kukacka"] = Fibres(kohout_kukacka=template)
     if (given := case.fibres.polylines) is not None:

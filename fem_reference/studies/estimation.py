@@ -3,11 +3,19 @@
 import logging
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem_reference.assessment.estimation import CurveError, DecompositionError, Estimation, FitError, HeightError
+from fem_reference.assessment.estimation import (
+    AnswerChange,
+    CurveError,
+    DecompositionError,
+    Estimation,
+    FitError,
+    HeightError,
+)
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, enclosed_volume
 from fem_reference.geometry import radial_basis
@@ -15,8 +23,9 @@ from fem_reference.geometry.curves import TECHNIQUES, Curve
 from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.problems import muscle
 from fem_reference.problems.setup import Setup
+from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies.decompositions import of_decompositions
+from fem_reference.studies.decompositions import answers, of_decompositions
 
 log = logging.getLogger(__name__)
 
@@ -27,10 +36,12 @@ _ALONG = 1000  # points at which a curve is looked at
 _POLYNOMIAL = 3  # terms of a plane
 
 
-def estimate(cases: Iterable[MuscleCase]) -> Estimation:
-    """All techniques on all cases."""
+def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
+    """All techniques on all cases; with a ``store`` of runs also the reference's answers with each decomposition, at the quick size
+    of each case.
+    """
     curves, heights, fits, missing = list[CurveError](), list[HeightError](), list[FitError](), dict[str, str]()
-    decompositions: list[DecompositionError] = []
+    decompositions, changes = list[DecompositionError](), list[AnswerChange]()
     for case in cases:
         log.info("%s: curves, heights and surfaces", case.name)
         try:
@@ -42,7 +53,9 @@ def estimate(cases: Iterable[MuscleCase]) -> Estimation:
         heights += of_attachments(case.name, setup)
         fits += of_surface(case.name, setup)
         decompositions += of_decompositions(case, setup)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions))
+        if store is not None:
+            changes += answers(casefile.read_muscle(case.name, case.quick) if case.quick else case, store)
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions), tuple(changes))
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:

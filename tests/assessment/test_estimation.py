@@ -1,6 +1,13 @@
 """Records of estimation techniques, with made-up errors for the tests of the page."""
 
-from fem_reference.assessment.estimation import CurveError, DecompositionError, Estimation, FitError, HeightError
+from fem_reference.assessment.estimation import (
+    AnswerChange,
+    CurveError,
+    DecompositionError,
+    Estimation,
+    FitError,
+    HeightError,
+)
 from fem_reference.geometry.curves import TECHNIQUES
 
 
@@ -15,7 +22,11 @@ def found() -> Estimation:
     heights = [HeightError("one", "origin", choice, 9, 0.1, 1e5) for choice in ("grid", "Halton")]
     fits = [FitError("one", 900, count, 10 / count, 20 / count, 0.99) for count in (10, 30)]
     beside = DecompositionError("one", "CHMD", "file", 3.14, 12.0, 1.05, 0.02, 4)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), {"lost": "why it was"}, (beside,))
+    changes, bars = {"surface_deviation.rms": 0.123, "joint_moment.force": 4.56}, {"surface_deviation.rms": 0.0789}
+    answer = AnswerChange("one", "CHMD", "Laplace field", "converged", changes, bars)
+    lost = AnswerChange("one", "file", "Laplace field", "diverged", {}, bars)
+    missing = {"lost": "why it was"}
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, (beside,), (answer, lost))
 
 
 def test_numbers_are_counted_for_vertices_and_gaussians() -> None:

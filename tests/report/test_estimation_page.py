@@ -19,6 +19,8 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert text.count("<svg") == 4
     assert "Decompositions into fibres" in text
     assert numbers["decompositions"][0]["source"] == "CHMD"
+    assert [one["status"] for one in numbers["answers"]] == ["converged", "diverged"]
+    assert all(word in text for word in ("0.123", "0.0789", "4.56", "file: diverged"))
     assert "why it was" in text
     assert "1e+05" in text
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 import shapes
+import small
 
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.studies.decompositions import compared, crossings
+from fem_reference.scenes import casefile
+from fem_reference.studies import decompositions
+from fem_reference.studies.decompositions import answers, compared, crossings
 
 BOX = shapes.skin(shapes.box((2, 2, 4), (20.0, 20.0, 60.0)))
 
@@ -34,3 +37,18 @@ def test_lines_that_cross_are_counted_once_a_pair() -> None:
     crossing = _lines(_line(0, 40, (10, 5, 0)), _line(20, 40, (3, 5, 0)), _line(0, 40, (10, 15, 0)))
     assert crossings(crossing) == 1
     assert crossings(_lines(_line(0, 40, (10, 5, 0)), _line(20, 40, (10, 5, 0)))) == 0, "their ends may meet"
+
+
+@pytest.mark.slow
+def test_the_same_fibres_change_no_answer_and_others_do(tmp_path, monkeypatch) -> None:
+    """The Laplace field under another name; and the template's lines, which in a bar are the field's to a few degrees."""
+    case = casefile.read_muscle(small.write(tmp_path / "bar"))
+    own = decompositions.variants
+    monkeypatch.setattr(decompositions, "variants", lambda one: (found := own(one)) | {"again": found["Laplace field"]})
+    found = {one.source: one for one in answers(case, tmp_path / "runs")}
+    assert set(found) == {"Kohout and Kukacka", "again"}
+    assert found["again"].status == "converged"
+    assert max(found["again"].changes.values()) == 0
+    assert {"surface_deviation.rms", "fibre_length.max", "joint_moment.force"} <= set(found["again"].changes)
+    assert 0 < found["Kohout and Kukacka"].changes["surface_deviation.rms"] < 1
+    assert found["again"].bars["surface_deviation.rms"] > 0
