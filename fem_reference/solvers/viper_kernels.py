@@ -94,7 +94,8 @@ def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float
     cone = np.pi / 3 / rest
     along, of_a, of_b = cone * square, cone * lengths * (2 * a + b), cone * lengths * (a + 2 * b)
     step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)
-    points[:, 1:-1] -= np.diff((step * along / np.maximum(lengths, _TINY))[..., None] * steps, axis=1)
+    tangents = steps / np.maximum(lengths, _TINY)[..., None]
+    points[:, 1:-1] -= np.diff((step * along)[..., None] * tangents, axis=1)
     change = np.zeros_like(radii)
     change[:, :-1] += step * of_a
     change[:, 1:] += step * of_b
