@@ -46,7 +46,7 @@ def force_arms(run: Run, joint: Joint) -> Floats:
     """
     moment, force = _values(run, joint)
     known = force > _LEAST * force.max(initial=0.0)
-    return np.divide(moment, force, out=np.full(len(force), np.nan), where=known)
+    return np.asarray(np.divide(moment, force, out=np.full(len(force), np.nan), where=known))
 
 
 def _has_force(run: Run, joint: Joint) -> bool:
