@@ -140,10 +140,9 @@ def _axes(away: Floats) -> Floats:
 
 
 def _inside(surface: Surface) -> Floats:
-    """Points (k, 3) inside, near the nodes of a cubic grid: on them, rounding would decide which of its nodes are equally far."""
+    """Nodes (k, 3) of a cubic grid that are inside."""
     step = float(np.cbrt(1 / _INSIDE))
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     ticks = [np.arange(start + step / 2, end, step) for start, end in zip(low, high, strict=True)]
     nodes = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    nodes += step * np.random.default_rng(0).uniform(-0.1, 0.1, nodes.shape)
     return np.asarray(nodes[igl.fast_winding_number(surface.points, surface.triangles, nodes) > 0.5])

@@ -65,6 +65,17 @@ def test_a_turned_scaled_and_reordered_surface_has_the_same_fit() -> None:
     assert np.sqrt(np.square(other).mean()) == pytest.approx(2 * np.sqrt(np.square(one).mean()), rel=0.3)
 
 
+def test_a_fit_does_not_depend_on_axes_place_or_size() -> None:
+    """Of a rough surface, which has axes of its own, the same fit up to rounding."""
+    ball, rng = shapes.sphere(2, 20.0), np.random.default_rng(0)
+    surface = ball.moved_to(ball.points * [1, 1, 1.5] + rng.normal(scale=0.5, size=ball.points.shape))
+    turn = np.linalg.qr(rng.normal(size=(3, 3))).Q
+    turn *= 2.5 * np.linalg.det(turn)
+    moved = surface.moved_to(surface.points @ turn.T + [30, -50, 7])
+    there, here = (fit(one, 12).project(one.points) for one in (moved, surface))
+    np.testing.assert_allclose(there, here @ turn.T + [30, -50, 7], atol=1e-9)
+
+
 def test_farthest_points_spread() -> None:
     line = np.linspace(0, 1, 101)[:, None] ** 2
     chosen = np.sort(line[farthest_points(line, 3), 0])
