@@ -61,7 +61,9 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
     """The reference's answer on a case with each source of fibres, beside that with the Laplace field's and its error bars. Lengths
     are those of the Laplace field's lines, carried by each surface.
     """
-    scenes = variants(case if any("fibre" in one.needs for one in case.effects) else _pulling(case))
+    # Candidates may not fit other fibres.
+    alone = case.model_copy(update={"candidate": ()})
+    scenes = variants(alone if any("fibre" in one.needs for one in case.effects) else _pulling(alone))
     if LAPLACE not in scenes:
         return
     log.info("%s: the reference with fibres of the Laplace field", case.name)
