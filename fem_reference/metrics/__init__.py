@@ -24,9 +24,9 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
 # Places where pages show a statistic: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
-# its sentence; ``curve``, drawings of changes from rest; ``solvers``, tables of solvers; ``scenes``, the table over all scenes;
-# ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
-Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
+# its sentence; ``curve``, drawings of changes from rest; ``angle``, those over the angle of a joint; ``solvers``, tables of
+# solvers; ``scenes``, the table over all scenes; ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
+Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scenes", "rank", "claim"]
 
 
 @dataclass(frozen=True)

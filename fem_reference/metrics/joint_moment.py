@@ -14,9 +14,11 @@ from fem_reference.problems.setup import Joint
 from fem_reference.runs.store import Run
 
 STATISTICS = {
-    "moment": Statistic("N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26}),
+    "moment": Statistic(
+        "N mm", "Joint", "moment", curve="Moment of the muscle about the joint", shown={"curve": 26, "angle": 26}
+    ),
     "force": Statistic(
-        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27}
+        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
     ),
 }
 OF, AGAINST = "lines", "reference"

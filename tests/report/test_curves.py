@@ -1,9 +1,14 @@
 """Curves over frames: bands as wide as error bars, crosses for what is not a number, one axis for all candidates."""
 
+import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.metrics import Measure
+from fem_reference.problems.setup import Joint
 from fem_reference.report import gallery
 from fem_reference.report.curves import curves, surface_limits
 from tests.report.comparisons import alone, measured, with_bars
@@ -40,3 +45,35 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
     assert logarithmic
     assert (low, high) == (pytest.approx(4e-3), pytest.approx(1.3 * 1.5e4))
     assert surface_limits(alone(comparison)) == (0.0, 1.04, False)
+
+
+def with_joint(comparison: Comparison, angles: tuple[float, ...]) -> Comparison:
+    """The comparison with a joint "knee" at ``angles`` [rad] and moment arms of the reference and of "quick"."""
+    numbers, bone = comparison.reference.numbers, comparison.setup.bones[0]
+    joint = Joint(
+        "knee", bone, np.array([0.0, 0, 1]), np.zeros(3), lambda frame: float(np.interp(frame, numbers, angles))
+    )
+    arms = {"mean": 30.0, "least": 20.0, "greatest": 45.0}
+    found = tuple(Measure("moment_arm", name, "mm", arm + np.arange(5.0)) for name, arm in arms.items())
+    changes = comparison.changes | {name: comparison.changes[name] + found for name in ("reference", "quick")}
+    return replace(comparison, changes=changes, context=replace(comparison.context, bones=(bone,), joints=(joint,)))
+
+
+def test_moment_arms_stand_over_the_angle_of_the_joint_in_degrees(comparison):
+    drawn = {one.title: one.markup for one in curves(with_joint(comparison, (0, 0.25, 0.5, 0.75, 1.0)))}
+    arms = "Moment arm, mean over the fibres"
+    over_frames, over_angle = drawn[arms], drawn[f"{arms}, over the angle"]
+    assert len(drawn) == 7
+    assert "angle of knee [°]" in over_angle
+    assert "least and greatest fibre" in over_angle
+    ticks = [float(text) for text in re.findall(r">([\d.]+)</text>", over_angle)]
+    assert {10, 50} <= set(ticks)  # 57.3 degrees at the end
+    assert max(ticks) < 60
+    assert "angle" not in over_frames
+    assert "torn" not in over_angle  # has no arms
+
+
+def test_no_curve_over_an_angle_that_does_not_change(comparison):
+    drawn = [one.title for one in curves(with_joint(comparison, (0.5,) * 5))]
+    assert "Moment arm, mean over the fibres" in drawn
+    assert not any("over the angle" in title for title in drawn)
