@@ -51,22 +51,23 @@ def _write_tables(problem: MuscleProblem, folder: Path) -> None:
         for frame in problem.frames
     ]
     entries = [f"m{row}{column}" for row in range(4) for column in range(4)]
-    _write_csv(folder / "poses.csv", ("bone", "frame", *entries), poses)
+    write_csv(folder / "poses.csv", ("bone", "frame", *entries), poses)
     attached = [(one.attachment, one.bone.name, vertex) for one in problem.attached for vertex in one.vertices.tolist()]
-    _write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), attached)
+    write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), attached)
     facets = [
         (one.attachment, one.bone.name, *facet)
         for one in problem.attached
         for facet in problem.mesh.facets[one.attachment].tolist()
     ]
-    _write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
+    write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
     within = embed(problem.mesh, problem.surface.points)
     places = zip(within.tets.tolist(), within.barycentric.tolist(), strict=True)
     inside = [(vertex, tet, *map(repr, shares)) for vertex, (tet, shares) in enumerate(places)]
-    _write_csv(folder / "surface_in_tets.csv", ("vertex", "tet", "w0", "w1", "w2", "w3"), inside)
+    write_csv(folder / "surface_in_tets.csv", ("vertex", "tet", "w0", "w1", "w2", "w3"), inside)
 
 
-def _write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[Any]]) -> None:
+def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[object]]) -> None:
+    """Write a table with the names of its ``columns`` above."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([columns, *entries])
     files.write_text(path, text.getvalue())

@@ -1,5 +1,6 @@
 """Runs of a case as one collection for ParaView: named blocks in the rest state, which the array ``displacement`` moves.
 
+forces.csv               force, its point of application, moment and moment arm of each run by frame and bone
 runs.pvd                 the time of each frame [s], its number where the case has no time
 frames/frame_0010.vtm    reference and candidates (muscle, fibres; of the reference interior), bones, attachments
 """
@@ -14,7 +15,7 @@ import numpy as np
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.effects.contact import among
-from fem_reference.export import texts
+from fem_reference.export import forces, texts
 from fem_reference.export.folders import new_folder
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.foundations.motion import apply
@@ -52,6 +53,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
             entries.append((number if case.frames.interval is None else number * case.frames.interval, name))
             log.info("%s: frame %d written", case.name, number)
         files.write_pvd(part / INDEX, entries)
+        forces.write_table(comparison, part / forces.FILE)
         unit = "frame numbers" if case.frames.interval is None else "seconds"
         files.write_text(part / "README.md", texts.paraview_readme(case, unit, states=frames.results is not None))
         return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
@@ -135,6 +137,8 @@ class _Frames:
         stretch = {"fibre_stretch": local_fields.stretch_along(lines, points[None])[0]}
         whole = {"stretch_of_fibre": lines.lengths(points) / lines.lengths()}
         blocks["fibres"] = DataBlock(lines.points, lines, _moved(lines.points, points) | stretch, whole)
+        if (pull := forces.block(run, self.setup, i)) is not None:
+            blocks["forces"] = pull
         if run is self.reference and self.results is not None and run.numbers[i] in self.results.frames:
             blocks["interior"] = interior(self.results, run.numbers[i])
         return blocks

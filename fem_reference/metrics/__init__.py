@@ -24,9 +24,9 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
 # Places where pages show a statistic: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
-# its sentence; ``curve``, drawings of changes from rest; ``solvers``, tables of solvers; ``scenes``, the table over all scenes;
-# ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
-Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
+# its sentence; ``curve``, drawings of changes from rest; ``angle``, those over the angle of a joint; ``solvers``, tables of
+# solvers; ``scenes``, the table over all scenes; ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
+Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scenes", "rank", "claim"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Statistic:
     ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
     ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
     position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
-    for the value of a single fibre; ``of_joint``: True where its curve is also drawn over the angle of the joint.
+    for the value of a single fibre.
     """
 
     unit: str
@@ -48,7 +48,6 @@ class Statistic:
     shown: Mapping[Shown, int] = field(default_factory=dict)
     local: bool = False
     lone: bool = False
-    of_joint: bool = False
 
     @property
     def label(self) -> str:

@@ -19,11 +19,10 @@ STATISTICS = {
         "Joint",
         "moment",
         curve="Moment of the muscle about the joint",
-        of_joint=True,
-        shown={"curve": 26, "rank": 50},
+        shown={"curve": 26, "angle": 26, "rank": 50},
     ),
     "force": Statistic(
-        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", of_joint=True, shown={"curve": 27}
+        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
     ),
 }
 OF, AGAINST = "lines", "reference"

@@ -19,10 +19,12 @@ from fem_reference.runs.store import Run
 _TITLE = "Moment arm"
 STATISTICS = {
     "mean": Statistic(
-        "mm", _TITLE, "mean", curve="Moment arm, mean over the fibres", shown={"curve": 25}, local=True, of_joint=True
+        "mm", _TITLE, "mean", curve="Moment arm, mean over the fibres", shown={"curve": 25, "angle": 25}, local=True
     ),
     "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 35, "rank": 40}, local=True),
     "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 35}, local=True, lone=True),
+    "least": Statistic("mm", _TITLE, "least of a fibre", local=True, lone=True),
+    "greatest": Statistic("mm", _TITLE, "greatest of a fibre", local=True, lone=True),
 }
 OF, AGAINST = "lines", "reference"
 # Angles [rad] and entries of poses that are nearer than this are the same.
@@ -31,13 +33,16 @@ _SAME = 1e-9
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``r - r_reference`` [mm]: signed ``mean``, ``rms`` and greatest magnitude ``max``."""
+    """Statistics over the fibres of ``r - r_reference`` [mm]: signed ``mean``, ``least`` and ``greatest``, ``rms``, and greatest
+    magnitude ``max``.
+    """
     if not context.joints or len(run.numbers) < 2:
         return ()
     found, expected = both_lengths(run, reference, context)
     arms = excursion_arms(found - expected, context, run.numbers)
     magnitudes = np.abs(arms)
     values = {"mean": arms.mean(axis=1), "rms": np.sqrt(np.mean(arms**2, axis=1)), "max": magnitudes.max(axis=1)}
+    values |= {"least": arms.min(axis=1), "greatest": arms.max(axis=1)}
     return measures("moment_arm", values, tuple(f"fibre {fibre}" for fibre in np.argmax(magnitudes, axis=1)))
 
 

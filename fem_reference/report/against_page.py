@@ -134,7 +134,7 @@ def _curve(one: Change, i: int) -> Drawing:
         axes.plot(frames, np.abs(one.now), color=PALETTE[0], linewidth=1.8, label="now")
         axes.set_ylim(bottom=0)
 
-    return over_frames(f"change-{i}", f"{title_of(one.name).capitalize()}: {one.word}", one.unit, draw, 3.0)
+    return over_frames(f"change-{i}", f"{title_of(one.name).capitalize()}: {one.word}", one.unit, draw)
 
 
 def _moved(versions: Versions) -> Drawing | None:
@@ -149,7 +149,7 @@ def _moved(versions: Versions) -> Drawing | None:
             axes.plot(frames, [value(row) if len(row) else np.nan for row in rows], style, color=PALETTE[0], label=name)
         axes.set_ylim(bottom=0)
 
-    return over_frames("moved", "Distance of vertices from where they were", "mm", draw, 3.0)
+    return over_frames("moved", "Distance of vertices from where they were", "mm", draw)
 
 
 def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:

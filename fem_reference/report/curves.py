@@ -1,22 +1,26 @@
 """Curves over frames, and over the angles of joints, for the page of a comparison."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, described, find
 from fem_reference.metrics.moment_arm import turning
+from fem_reference.problems.setup import Joint
 from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, colour_of, over_frames, plain_numbers
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
 _KNOWN = "error bar"
 _FAR = 50.0  # of two candidates' greatest distances, beyond which they share a logarithmic axis
+_RANGE = "least and greatest fibre"
 _STATISTICS = (
     ("max", "worst vertex", "-"),
     ("hausdorff", "Hausdorff", "--"),
@@ -28,34 +32,11 @@ _STATISTICS = (
 def curves(comparison: Comparison) -> list[Drawing]:
     """Every drawing for which the comparison has numbers."""
     found = [_surface(comparison, i) for i in range(len(comparison.candidates))]
-    frames = _Along(
-        "frame", np.array(comparison.reference.numbers, float), np.ones(len(comparison.reference.numbers), bool)
-    )
-    for key, one in described("curve").items():
-        places = [frames, *(_angles(comparison) if one.of_joint else [])]
-        found += [_of_runs(comparison, *key, one.curve, along) for along in places]
+    found += [_of_runs(comparison, *key, one.curve) for key, one in described("curve").items()]
+    context = comparison.context
+    for i, joint in enumerate(context.joints if isinstance(context, MeasurementContext) else ()):
+        found += [_over_angle(comparison, i, joint, key, one.curve) for key, one in described("angle").items()]
     return [drawing for drawing in [*found, _inversion(comparison)] if drawing is not None]
-
-
-class _Along(NamedTuple):
-    """What a curve goes along: a ``name``, and by frame a ``place`` (f,) and the mask (f,) of those that count."""
-
-    name: str
-    places: Floats
-    kept: NDArray[np.bool_]
-
-
-def _angles(comparison: Comparison) -> list[_Along]:
-    """The angle [deg] of each joint, at the frames about which it turns alone."""
-    context, numbers = comparison.context, comparison.reference.numbers
-    if not isinstance(context, MeasurementContext) or len(numbers) < 2:
-        return []
-    which = turning(context.joints, context, numbers)
-    return [
-        _Along(f"angle of {joint.name} [deg]", np.degrees(joint.angles(numbers)), which == i)
-        for i, joint in enumerate(context.joints)
-        if (which == i).any()
-    ]
 
 
 def label_of(inverted: Measure) -> str:
@@ -63,25 +44,47 @@ def label_of(inverted: Measure) -> str:
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
-def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str, along: _Along) -> Drawing | None:
-    """A measure of every run from rest ``along`` something, with the error bar of the reference; None where no run has it."""
-    measures = {run.name: find(comparison.changes[run.name], metric, statistic) for run in comparison.runs}
-    found = {run: measure for run, measure in measures.items() if measure is not None}
+def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) -> Drawing | None:
+    """A measure of every run from rest, with the error bar of the reference; None where no run has it."""
+    found, frames = _found(comparison, metric, statistic), np.asarray(comparison.reference.numbers, float)
+    draw = partial(_draw_runs, comparison, found, frames, np.ones(len(frames), bool))
+    return over_frames(f"{metric}-{statistic}", title, next(iter(found.values())).unit, draw) if found else None
 
-    def draw(axes: Axes) -> None:
-        for i, run in enumerate(comparison.runs):
-            if run.name in found:
-                colour = colour_of(i)
-                if i == 0:
-                    _band(axes, comparison, "change", found[run.name], found[run.name].values, along=along)
-                values, wide = found[run.name].values[along.kept], 2.4 if i == 0 else 1.5
-                _line(axes, along.places[along.kept], values, run.name, color=colour, linewidth=wide)
 
-    if not found:
+def _over_angle(comparison: Comparison, i: int, joint: Joint, key: tuple[str, str], title: str) -> Drawing | None:
+    """The same over the angle of the joint of index ``i``, where it turns alone; None where nothing is known there."""
+    context, numbers = comparison.context, comparison.reference.numbers
+    assert isinstance(context, MeasurementContext)  # the caller asked
+    shown, found = turning(context.joints, context, numbers) == i, _found(comparison, *key)
+    if not any(np.isfinite(one.values[shown]).any() for one in found.values()):
         return None
-    over = "" if along.name == "frame" else f", over the {along.name.removesuffix(' [deg]')}"
-    unit = next(iter(found.values())).unit
-    return over_frames(f"{metric}-{statistic}{over}", title + over, unit, draw, along=along.name)
+    draw = partial(_draw_runs, comparison, found, np.degrees(joint.angles(numbers)), shown)
+    name, over = f"{'-'.join(key)}-{i}", f"angle of {joint.name} [°]"
+    return over_frames(name, f"{title}, over the angle", next(iter(found.values())).unit, draw, over)
+
+
+def _found(comparison: Comparison, metric: str, statistic: str) -> dict[str, Measure]:
+    """The measure from rest by name of the run, of those that have it."""
+    measures = {run.name: find(comparison.changes[run.name], metric, statistic) for run in comparison.runs}
+    return {run: measure for run, measure in measures.items() if measure is not None}
+
+
+def _draw_runs(
+    comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
+) -> None:
+    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,); of means also the range of the fibres."""
+    for i, run in enumerate(comparison.runs):
+        if run.name not in found:
+            continue
+        one, colour = found[run.name], colour_of(i)
+        if i == 0 and (bar := _bar(comparison, "change", one)) is not None:
+            _band(axes, along[shown], one.values[shown], bar[shown])
+        kept = replace(one, values=one.values[shown])
+        _line(axes, along[shown], kept, run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
+        for end in ("least", "greatest") if one.statistic == "mean" else ():
+            if other := find(comparison.changes[run.name], one.metric, end):
+                label = "_" if _RANGE in axes.get_legend_handles_labels()[1] else _RANGE
+                axes.plot(along[shown], other.values[shown], ":", color=colour, linewidth=0.8, label=label)
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
@@ -107,8 +110,11 @@ def _surface(comparison: Comparison, i: int) -> Drawing | None:
     def draw(axes: Axes) -> None:
         for measure, label, style in found:
             if measure is not None:
-                _band(axes, comparison, "deviation", measure, np.zeros(len(run.numbers)), style)
-                _line(axes, run.numbers, measure.values, label, color=colour_of(i + 1), linestyle=style)
+                bar = _bar(comparison, "deviation", measure)
+                if bar is not None:
+                    _band(axes, run.numbers, np.zeros(len(bar)), bar)
+                    axes.plot(run.numbers, bar, color="#888888", linewidth=1.0, linestyle=style)
+                _line(axes, run.numbers, measure, label, color=colour_of(i + 1), linestyle=style)
         if far:
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)
@@ -124,39 +130,29 @@ def _inversion(comparison: Comparison) -> Drawing | None:
     def draw(axes: Axes) -> None:
         for measure, style in zip(measures, ("-", "--", ":", "-.") * len(measures), strict=False):
             label = label_of(measure) or "det F"
-            _line(axes, reference.numbers, measure.values, label, color=REFERENCE, linestyle=style)
+            _line(axes, reference.numbers, measure, label, color=REFERENCE, linestyle=style)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
     title = "Smallest det F of the reference (inside out below 0)"
     return over_frames("inversion", title, "", draw) if measures else None
 
 
-def _band(
-    axes: Axes,
-    comparison: Comparison,
-    of: Of,
-    measure: Measure,
-    middle: Floats,
-    linestyle: str | None = None,
-    along: _Along | None = None,
-) -> None:
-    """Error bars of the reference, around ``middle`` (f,), where that is stated; with a ``linestyle`` its upper edge too."""
+def _bar(comparison: Comparison, of: Of, measure: Measure) -> Floats | None:
+    """The error bars (f,) of the reference, None where they are not stated."""
     bars = comparison.error_bars
     bar = bars and bars.find(of, measure.metric, measure.statistic)
-    if not bar:
-        return
-    numbers, lower, upper = np.asarray(comparison.reference.numbers), middle - bar.values, middle + bar.values
-    if along is not None:
-        numbers, lower, upper = (values[along.kept] for values in (along.places, lower, upper))
+    return bar.values if bar else None
+
+
+def _band(axes: Axes, along: Sequence[float] | Floats, middle: Floats, bar: Floats) -> None:
+    """The error bars ``bar`` (f,) around ``middle`` (f,), ``along`` (f,) the axis."""
     labelled = _KNOWN in axes.get_legend_handles_labels()[1]
-    axes.fill_between(numbers, lower, upper, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
-    if linestyle:
-        axes.plot(numbers, upper, color="#888888", linewidth=1.0, linestyle=linestyle)
+    axes.fill_between(along, middle - bar, middle + bar, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
 
 
-def _line(axes: Axes, numbers: ArrayLike, found: Floats, label: str, **look: str | float) -> None:
-    """A measure over frames or angles; a cross on their axis where it is not finite."""
-    frames, values = np.asarray(numbers), np.asarray(found, float)
+def _line(axes: Axes, numbers: Sequence[float] | Floats, measure: Measure, label: str, **look: str | float) -> None:
+    """A measure over frames; a cross on the frame axis where it is not finite."""
+    frames, values = np.asarray(numbers), np.asarray(measure.values, float)
     bad = ~np.isfinite(values)
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]
     if bad.any():

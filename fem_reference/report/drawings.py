@@ -84,20 +84,18 @@ def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figu
     return Drawing(title, inline(text.getvalue(), name, title))
 
 
-def over_frames(
-    name: str, title: str, unit: str, draw: Callable[[Axes], None], height: float = 3.1, along: str = "frame"
-) -> Drawing:
-    """A drawing of curves over frame numbers, or what else they go ``along``, with a legend above."""
+def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], over: str = "frame") -> Drawing:
+    """A drawing of curves over frame numbers, or what else is named by ``over``, with a legend above."""
 
     def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
         axes.margins(x=0.02)
-        axes.set_xlabel(along)
+        axes.set_xlabel(over)
         axes.set_ylabel(unit.replace("mm3", "mm³"))
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
         _legend(figure, axes)
 
-    return drawn(name, title, (5.4, height), whole)
+    return drawn(name, title, (5.4, 3.1), whole)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:

@@ -147,9 +147,10 @@ def test_against_itself_zero_and_from_rest_the_arm() -> None:
     context = context_of(joint, run)
     for one in measure(run, run, context, ["moment_arm"]):
         assert_allclose(one.values, 0, atol=1e-12)
-    mean, rms, worst = measure(run, at_rest(run), context, ["moment_arm"])
+    mean, rms, worst, least, greatest = measure(run, at_rest(run), context, ["moment_arm"])
     arms = arms_of(run, context)
     assert_allclose(mean.values, arms.mean(axis=1), rtol=1e-9)
     assert_allclose(rms.values, np.sqrt((arms**2).mean(axis=1)), rtol=1e-9)
     assert_allclose(worst.values, arms.max(axis=1), rtol=1e-9)
+    assert_allclose([least.values, greatest.values], np.sort(arms, axis=1).T, rtol=1e-9)  # of two fibres
     assert measure(run, run, replace(context, joints=()), ["moment_arm"]) == ()

@@ -1,16 +1,17 @@
 """Curves over frames: bands as wide as error bars, crosses for what is not a number, one axis for all candidates."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fem_reference.foundations.motion import Rotation
+from fem_reference.assessment.comparison import Comparison
 from fem_reference.metrics import Measure
-from fem_reference.problems.setup import Bone, Joint
+from fem_reference.problems.setup import Joint
 from fem_reference.report import gallery
 from fem_reference.report.curves import curves, surface_limits
-from tests.report.comparisons import NUMBERS, alone, measured, with_bars
+from tests.report.comparisons import alone, measured, with_bars
 
 
 def test_curves_show_where_a_run_is_not_a_number(comparison):
@@ -26,28 +27,6 @@ def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
     printed = {curve.title: "error bar" in curve.markup for curve in banded}
     assert printed == {curve.title: not curve.title.startswith("Smallest det F") for curve in banded}
     assert not any("error bar" in curve.markup for curve in bare)
-
-
-def test_moment_arms_are_drawn_over_the_angle_of_the_joint_too(comparison):
-    """1 rad is 57 degrees. A joint that rests has no angle to draw over."""
-    arm, title = (
-        Measure("moment_arm", "mean", "mm", np.linspace(10, 20, 5), NUMBERS),
-        "Moment arm, mean over the fibres",
-    )
-    for last in (1.0, 0.0):
-        turn = Rotation((0, 0, 1), (0, 0, 0), (0.0, 40.0), (0.0, last))
-        bone = Bone("plate", comparison.reference.surface, turn)
-        joint = Joint("hinge", bone, np.array([0.0, 0, 1]), np.zeros(3), lambda n, last=last: n / 40 * last)
-        context = replace(comparison.context, bones=(bone,), joints=(joint,))
-        changes = {name: (*found, arm) for name, found in comparison.changes.items()}
-        drawn = {one.title: one.markup for one in curves(replace(comparison, context=context, changes=changes))}
-        assert ">frame<" in drawn[title]
-        assert (f"{title}, over the angle of hinge" in drawn) is (last > 0)
-        if last:
-            over = drawn[f"{title}, over the angle of hinge"]
-            assert ">angle of hinge [deg]<" in over
-            assert ">50<" in over
-            assert ">60<" not in over
 
 
 def test_candidates_share_one_colour_scale_and_one_axis(comparison):
@@ -66,3 +45,35 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
     assert logarithmic
     assert (low, high) == (pytest.approx(4e-3), pytest.approx(1.3 * 1.5e4))
     assert surface_limits(alone(comparison)) == (0.0, 1.04, False)
+
+
+def with_joint(comparison: Comparison, angles: tuple[float, ...]) -> Comparison:
+    """The comparison with a joint "knee" at ``angles`` [rad] and moment arms of the reference and of "quick"."""
+    numbers, bone = comparison.reference.numbers, comparison.setup.bones[0]
+    joint = Joint(
+        "knee", bone, np.array([0.0, 0, 1]), np.zeros(3), lambda frame: float(np.interp(frame, numbers, angles))
+    )
+    arms = {"mean": 30.0, "least": 20.0, "greatest": 45.0}
+    found = tuple(Measure("moment_arm", name, "mm", arm + np.arange(5.0)) for name, arm in arms.items())
+    changes = comparison.changes | {name: comparison.changes[name] + found for name in ("reference", "quick")}
+    return replace(comparison, changes=changes, context=replace(comparison.context, bones=(bone,), joints=(joint,)))
+
+
+def test_moment_arms_stand_over_the_angle_of_the_joint_in_degrees(comparison):
+    drawn = {one.title: one.markup for one in curves(with_joint(comparison, (0, 0.25, 0.5, 0.75, 1.0)))}
+    arms = "Moment arm, mean over the fibres"
+    over_frames, over_angle = drawn[arms], drawn[f"{arms}, over the angle"]
+    assert len(drawn) == 7
+    assert "angle of knee [°]" in over_angle
+    assert "least and greatest fibre" in over_angle
+    ticks = [float(text) for text in re.findall(r">([\d.]+)</text>", over_angle)]
+    assert {10, 50} <= set(ticks)  # 57.3 degrees at the end
+    assert max(ticks) < 60
+    assert "angle" not in over_frames
+    assert "torn" not in over_angle  # has no arms
+
+
+def test_no_curve_over_an_angle_that_does_not_change(comparison):
+    drawn = [one.title for one in curves(with_joint(comparison, (0.5,) * 5))]
+    assert "Moment arm, mean over the fibres" in drawn
+    assert not any("over the angle" in title for title in drawn)

@@ -1,0 +1,90 @@
+"""Forces of runs on bones, as a table and as points with vectors, and the moment arms about joints."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.export.open_formats import write_csv
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.io.formats.vtk import DataBlock
+from fem_reference.metrics import MeasurementContext, find
+from fem_reference.metrics.moment_arm import turning
+from fem_reference.problems.setup import Bone, Setup
+from fem_reference.runs.store import Run
+
+FILE = "forces.csv"
+_ARMS = ("mean", "least", "greatest")
+_VECTORS = ("force_{}_N", "at_{}_mm", "moment_{}_N_mm")
+COLUMNS = (
+    *("run", "frame", "bone", "joint", "angle_deg"),
+    *(name.format(axis) for name in _VECTORS for axis in "xyz"),
+    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS)),
+)
+_NOWHERE = np.zeros(3)
+
+
+def write_table(comparison: Comparison, path: Path) -> None:
+    """Write a row for each run, frame and bone that has a force or a joint; what is not known is left empty."""
+    found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
+    write_csv(path, COLUMNS, (["" if value != value else value for value in row] for row in found))
+
+
+def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object, ...]]:
+    setup, numbers, context = comparison.setup, comparison.reference.numbers, comparison.context
+    assert isinstance(context, MeasurementContext)  # of a muscle
+    i = next((i for i, joint in enumerate(setup.joints) if joint.bone.name == bone.name), None)
+    joint, lost = None if i is None else setup.joints[i], np.full((len(numbers), 3), np.nan)
+    known = has_force(run, bone)
+    if joint is None and not known:
+        return
+    centre = _NOWHERE if joint is None else joint.centre
+    force, moment = (run.force(bone.name), run.moment(bone.name, centre)) if known else (lost, lost)
+    at = applied(run, bone, setup) if known else lost
+    about = lost[:, 0] if joint is None else moment @ joint.axis
+    angles = lost[:, 0] if joint is None else np.degrees(joint.angles(numbers))
+    alone = turning(setup.joints, context, numbers) == i
+    measures = [find(comparison.changes[run.name], "moment_arm", one) for one in _ARMS]
+    arms = np.array([lost[:, 0] if one is None else np.where(alone, one.values, np.nan) for one in measures])
+    columns = np.column_stack([angles, force, at, moment, about, arms.T]).tolist()
+    for number, values in zip(numbers, columns, strict=True):
+        yield run.name, number, bone.name, "" if joint is None else joint.name, *values
+
+
+def has_force(run: Run, bone: Bone) -> bool:
+    """True where a ``run`` knows its force on a ``bone``."""
+    try:
+        run.force(bone.name)
+    except InputError:
+        return False
+    return True
+
+
+def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
+    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0: on its central axis, about which no moment
+    is left but that along the force, nearest to the middle of what is attached to the bone; of what is not, to the origin.
+    """
+    attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
+    vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)
+    force = run.force(bone.name)
+    middle = np.zeros_like(force)
+    if len(vertices):
+        rest = setup.surface.points[vertices].mean(axis=0)
+        middle = np.array([bone.pose(number)[:3] @ np.append(rest, 1.0) for number in run.numbers])
+    left = run.moment(bone.name) - np.cross(middle, force)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(middle + np.cross(force, left) / (force**2).sum(axis=1, keepdims=True))
+
+
+def block(run: Run, setup: Setup, i: int) -> DataBlock | None:
+    """Points of application with the vectors ``force`` [N] at the frame of index ``i``; None where the run has no force then."""
+    known = [bone for bone in setup.bones if has_force(run, bone)]
+    points = np.array([applied(run, bone, setup)[i] for bone in known]).reshape(-1, 3)
+    forces = np.array([run.force(bone.name)[i] for bone in known]).reshape(-1, 3)
+    shown = np.isfinite(points).all(axis=1)
+    if not shown.any():
+        return None
+    arrays = {"displacement": np.zeros((int(shown.sum()), 3)), "force": forces[shown]}
+    return DataBlock(points[shown], np.zeros((0, 3), np.int64), arrays)
