@@ -19,7 +19,7 @@ class Touch:
     out: Floats
 
 
-class Obstacle(Protocol):
+class SmoothSurface(Protocol):
     """A smooth surface where ``level`` is 0, inside which it is negative."""
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.obstacles import Obstacle, Ring
+from fem_reference.geometry.obstacles import Ring, SmoothSurface
 
 Flags = NDArray[np.bool_]
 
@@ -15,7 +15,7 @@ Flags = NDArray[np.bool_]
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
 
 
-def taut(obstacles: Sequence[Obstacle], starts: Floats, ends: Floats) -> Floats:
+def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Floats:
     """Points (n, N, 3) of strings that are nearly taut: each in the middle of its neighbours, or on an obstacle."""
     rings = [one for one in obstacles if isinstance(one, Ring)]
     string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
@@ -49,7 +49,7 @@ def halved(string: Floats) -> Floats:
     return finer
 
 
-def touching(obstacle: Obstacle, string: Floats) -> Flags:
+def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
     """The points (n, N) of strings that may touch an obstacle: nearer than a tangent is after a quarter of a piece."""
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
@@ -57,7 +57,7 @@ def touching(obstacle: Obstacle, string: Floats) -> Flags:
     return np.asarray(away < (piece**2 / (16 * obstacle.bend))[:, None] + 1e-9)
 
 
-def met(obstacles: Sequence[Obstacle], string: Floats) -> list[tuple[int, ...]]:
+def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, ...]]:
     """The obstacles that each path may meet, in turn."""
     flags = np.array([touching(obstacle, halved(string)) for obstacle in obstacles])
     count = flags.sum(axis=2)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.obstacles import Obstacle, Touch
+from fem_reference.geometry.obstacles import SmoothSurface, Touch
 from fem_reference.geometry.taut_strings import Flags, halved, longest, met, taut, touching
 
 # Steps of a geodesic; the error of its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
@@ -102,7 +102,7 @@ class Winding:
 class _Pieces:
     """Geodesics on the m ``obstacles`` that n paths meet in turn: where they begin, along what (m, n, 3), how long (m, n)."""
 
-    obstacles: list[Obstacle]
+    obstacles: list[SmoothSurface]
     starts: Floats
     ends: Floats
     points: Floats
@@ -115,7 +115,7 @@ class _Pieces:
         return [_geodesic(*part) for part in parts]
 
     def kinks(self) -> Floats:
-        """How far (n, 4 m) [mm] straight parts are from the tangents at both ends of each geodesic, along normal and binormal."""
+        """Distances (n, 4 m) [mm] of straight parts from the tangents at both ends of each geodesic, along normal and binormal."""
         runs, found = self.run(), []
         before = [self.starts, *(points[-1] for points, _ in runs)]
         after = [*(points[0] for points, _ in runs[1:]), self.ends]
@@ -153,7 +153,7 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts, self.ends, np.array(points), np.array(along), np.array(sizes))
 
 
-def around(obstacles: Sequence[Obstacle], starts: Floats, ends: Floats) -> Winding:
+def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
     """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which have none of both inside."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
@@ -177,7 +177,7 @@ def around(obstacles: Sequence[Obstacle], starts: Floats, ends: Floats) -> Windi
     return found
 
 
-def _wrong(obstacles: Sequence[Obstacle], found: Winding, string: Floats) -> Flags:
+def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
     """The paths (n,) that cross an obstacle or are longer than the string, but for what its chords cut off."""
     count, shares = len(string), np.linspace(0, 1, _CHECKED)
     points = found.at(np.repeat(np.arange(count), _CHECKED), np.tile(shares, count))
@@ -189,7 +189,7 @@ def _wrong(obstacles: Sequence[Obstacle], found: Winding, string: Floats) -> Fla
     return wrong
 
 
-def _guess(met: list[tuple[int, Obstacle]], string: Floats) -> _Pieces:
+def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
     """Geodesics near the parts of strings that touch the obstacles."""
     fine, points, along, sizes = halved(string), [], [], []
     for _, obstacle in met:
@@ -239,7 +239,7 @@ def _better(pieces: _Pieces, change: Floats, kinks: Floats) -> _Pieces:
     return tried
 
 
-def _geodesic(obstacle: Obstacle, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,): Runge-Kutta's method."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
 

@@ -47,7 +47,7 @@ class Paths:
         return type(self)(self.parts, starts, ends, (on, off), middles, self.axes @ pose[:3, :3].T, self.turns)
 
     def touching(self) -> list[Touch]:
-        """Of the one obstacle, met from the starts on: what lies between these and it pulls along one line."""
+        """The one obstacle, as if met at the starts and left at the ends: what lies between pulls along the same lines."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 

@@ -67,7 +67,7 @@ class ObstacleOn(Record):
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """The kind of shape, by which messages name it."""
         return next(iter(self.model_fields_set - {"bone"}))
 
     def surface(self) -> Quadric | Ring:
