@@ -32,7 +32,7 @@ class Kind(NamedTuple):
 # By what people call them. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
 KINDS = {
     "a length": Kind("mm", ('"2 mm"', '"146, 238, -431 mm"'), 1e9),
-    "an angle": Kind("rad", ('"30 deg"',), 1e6),
+    "an angle": Kind("rad", ('"30 deg"', '"0, 0, 30 deg"'), 1e6),
     "a pressure": Kind("MPa", ('"30 kPa"', '"0, 6.25, 0 kPa"'), 1e7),
     "a fraction": Kind("", ('"0.5 %"',), 1e6, ("", "%", "percent")),
     "a number": Kind("", ('"0.5"',), written=("",)),

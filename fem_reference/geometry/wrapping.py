@@ -6,10 +6,14 @@ Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/1
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.obstacles import Touch
 
 Vector = tuple[float, float, float]
 
@@ -29,6 +33,23 @@ class Paths:
     middles: Floats
     axes: Floats
     turns: Floats
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """False (n,): each closed form has a path."""
+        return np.zeros(len(self.parts), dtype=bool)
+
+    def moved(self, pose: Floats) -> Self:
+        """The paths where a ``pose`` (4, 4) takes them."""
+        starts, ends, on, off, middles = (
+            apply(pose, points) for points in (self.starts, self.ends, *self.touches, self.middles)
+        )
+        return type(self)(self.parts, starts, ends, (on, off), middles, self.axes @ pose[:3, :3].T, self.turns)
+
+    def touching(self) -> list[Touch]:
+        """The one obstacle, as if met at the starts and left at the ends: what lies between pulls along the same lines."""
+        first, last = self.directions()
+        return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 
     @property
     def lengths(self) -> Floats:
@@ -69,10 +90,6 @@ class WrappingSphere:
     centre: Vector
     radius: float
 
-    def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the ball; negative outside."""
-        return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
-
     def around(self, starts: Floats, ends: Floats) -> Paths:
         """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along the great circle through both, or one of them
         where they are opposite each other; points inside count as on the surface.
@@ -89,10 +106,6 @@ class WrappingCylinder:
     point: Vector
     axis: Vector
     radius: float
-
-    def depths(self, points: Floats) -> Floats:
-        """Depths (n,) [mm] of ``points`` (n, 3) [mm] in the cylinder; negative outside."""
-        return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
         """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along a helix; points inside count as on it."""

@@ -28,6 +28,9 @@ def _checked_direction(direction: Vector, name: str) -> Vector:
     return direction
 
 
+Axis = Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))]
+
+
 class Keyframe(Record):
     """The place of a motion at a frame number: at an ``angle`` or at a ``distance``."""
 
@@ -39,7 +42,7 @@ class Keyframe(Record):
 class Motion(Record):
     """A rotation about a fixed ``axis`` through a ``centre`` or a translation along a ``direction``, linear between keyframes."""
 
-    axis: Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))] | None = None
+    axis: Axis | None = None
     centre: Point | None = None
     direction: Annotated[Vector, AfterValidator(partial(_checked_direction, name="a direction"))] | None = None
     keyframes: tuple[Keyframe, ...] = Field(min_length=2)
@@ -161,7 +164,7 @@ class CaseJoint(Record):
 
     name: Name
     bone: str
-    axis: Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))]
+    axis: Axis
     centre: Point
 
 

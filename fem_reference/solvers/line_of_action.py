@@ -5,7 +5,6 @@ points it is as short as it can be. It has a length, with ``hill`` also a force,
 shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
-from dataclasses import dataclass
 from typing import Annotated, Self
 
 import numpy as np
@@ -13,9 +12,9 @@ from pydantic import Field, model_validator
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Polylines
-from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
-from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
+from fem_reference.geometry.winding import Winding
+from fem_reference.geometry.wrapping import Paths
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.contents import vector_scalars
@@ -23,12 +22,10 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.hill import HillSettings
-from fem_reference.solvers.common.lines import Lines, Passed, Via, index, lines_of
+from fem_reference.solvers.common.lines import Lines, Passed, Via, lines_of
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
-
-# An end this deep [mm] in an obstacle is on its surface, but for rounding.
-_TOUCHES = 1e-6
+from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class SphereOn(CaseSphere):
@@ -48,19 +45,21 @@ class LineSettings(Record):
 
     ``via``: points in the order in which a fibre passes them. ``via_count``: so many points instead, evenly
     spread over each fibre, each on the bone of the nearer end. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight path would cross it. ``hill``: their forces.
+    line goes around, from one fixed point to the next, where the straight path would cross it; ``obstacle``: several.
+    ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
     via_count: Annotated[int, Field(ge=0), Trade((0, 2, 4, 8))] = 0
     sphere: SphereOn | None = None
     cylinder: CylinderOn | None = None
+    obstacle: tuple[ObstacleOn, ...] = ()
     hill: HillSettings | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.sphere is not None and self.cylinder is not None:
-            raise ValueError('at most one of "sphere", "cylinder"')
+        if (self.sphere is not None) + (self.cylinder is not None) + bool(self.obstacle) > 1:
+            raise ValueError('at most one of "sphere", "cylinder", "obstacle"')
         if self.via and self.via_count:
             raise ValueError('at most one of "via", "via_count"')
         places = [via.at for via in self.via]
@@ -69,53 +68,49 @@ class LineSettings(Record):
         return self
 
 
-@dataclass(frozen=True)
-class Wrap:
-    """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
-
-    obstacle: WrappingSphere | WrappingCylinder
-    bone: Bone
-    name: str
-
-
 class Shortest:
-    """The ``lines`` of a muscle, at any frame as short as the ``wrap`` lets them be."""
+    """The ``lines`` of a muscle, at any frame as short as the ``wraps`` let them be."""
 
     advice = "a smaller radius may help"
 
     def __init__(self, problem: MuscleProblem, settings: LineSettings) -> None:
         self.problem, self.vias = problem, len(settings.via) + settings.via_count
-        self.lines, self.wrap = _made(problem, settings, "line_of_action")
+        self.lines, self.wraps = _made(problem, settings, "line_of_action")
         self.cost = {"seconds_compile": 0.0}
-        self.inside: Trouble | None = None
+        self.wrong: Trouble | None = None
         self.found = Frame(problem.frames[0], None)
-        first = _paths(self.wrap, self.lines.at(problem.frames[0]).points, problem.frames[0])[0].lengths
         self.hill = settings.hill
-        self.muscles = (
-            () if self.hill is None else self.hill.muscles(first.reshape(len(self.lines.fixed), -1).sum(axis=1))
-        )
+        self.muscles = () if self.hill is None else self.hill.muscles(self.lengths(problem.frames[0]))
+
+    def lengths(self, number: int) -> Floats:
+        """The lengths (k,) [mm] of the lines at a frame."""
+        return _lengths(self.lines.at(number), self.wraps.around(self.lines.at(number).points, number))
 
     def move(self, number: int) -> None:
         """Find the paths at a frame."""
         passed = self.lines.at(number)
-        if self.wrap is not None and (inside := _inside(self.wrap, passed.points, number)):
-            self.inside = Trouble("diverged", inside)
+        wrong = self.wraps.inside(passed.points, number)[1]
+        if not wrong:
+            paths = self.wraps.around(passed.points, number)
+            wrong = "no shortest path found for a line" if paths.failed.any() else ""
+        if wrong:
+            self.wrong = Trouble("diverged", wrong)
         else:
-            self.found, lengths = _frame(passed, self.wrap, number, self.problem.fibres)
-            self.found.scalars.update(self._forces(lengths, passed, number))
+            self.found = _frame(passed, paths, number, self.problem.fibres)
+            self.found.scalars.update(self._forces(passed, paths))
 
-    def _forces(self, lengths: Floats, passed: Passed, number: int) -> dict[str, float]:
-        """Force [N] of lines of ``lengths`` (k,) [mm], mean length of fibres over the optimal one, forces on bones."""
+    def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:
+        """Force [N] of lines, mean length of fibres over the optimal one, forces on bones."""
         if self.hill is None:
             return {}
-        pairs = zip(self.muscles, lengths.tolist(), strict=True)
+        pairs = zip(self.muscles, _lengths(passed, paths).tolist(), strict=True)
         found = np.array([muscle.static(length, self.hill.activation) for muscle, length in pairs])
         sums = {"muscle_force": float(found[:, 0].sum()), "fibre_length_mean": float(found[:, 1].mean())}
-        return sums | _on_bones(self.problem.bones, self.wrap, passed, number, found[:, 0])
+        return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside the obstacle; None without."""
-        return self.inside
+        """The trouble with a fixed point inside an obstacle or a path not found; None without."""
+        return self.wrong
 
     def frame(self, _: int) -> Frame:
         """The lines."""
@@ -124,7 +119,7 @@ class Shortest:
     def ending(self) -> Outcome:
         """Converged, as every line is; what they go through and around."""
         kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
-        around = "" if self.wrap is None else f" or around the {self.wrap.name} on {self.wrap.bone.name}"
+        around = f" or around {self.wraps}" if self.wraps.given else ""
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
 
 
@@ -138,80 +133,61 @@ def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
     _made(problem, settings, place)
 
 
-def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wrap | None]:
-    """The lines and the obstacle; InputError below ``place`` where the case has not what they need, or a fixed point is inside the
+def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wraps]:
+    """The lines and the obstacles; InputError below ``place`` where the case has not what they need, or a fixed point is inside an
     obstacle at the first frame.
     """
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
-    wrap = _wrap(problem, settings, place)
-    if wrap is not None and (inside := _inside(wrap, lines.at(first).points, first)):
-        raise InputError(join(place, wrap.name), inside, "an obstacle with all of them outside")
-    return lines, wrap
+    alone = [
+        ObstacleOn(**{"bone": one.bone, name: one})
+        for name in ("sphere", "cylinder")
+        if (one := getattr(settings, name))
+    ]
+    names = [join(place, one.name) for one in alone] or [
+        join(place, f"obstacle[{i}]") for i in range(len(settings.obstacle))
+    ]
+    wraps = wraps_of(problem, (*alone, *settings.obstacle), names)
+    name, inside = wraps.inside(lines.at(first).points, first)
+    if inside:
+        raise InputError(join(place, name), inside, "an obstacle with all of them outside")
+    return lines, wraps
 
 
-def _frame(passed: Passed, wrap: Wrap | None, number: int, fibres: Polylines) -> tuple[Frame, Floats]:
-    """The lines with as many points as the fibres have, and the lengths of their paths (k,) [mm]; ``lost_by_chords_max`` [mm]: the
-    greatest length that chords cut off a path.
-    """
-    paths, pose = _paths(wrap, passed.points, number)
-    points = apply(pose, paths.at(passed.part, passed.share))
-    lengths = paths.lengths.reshape(len(passed.points), -1).sum(axis=1)
-    lost = float((lengths - fibres.lengths(points)).max())
-    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost}), lengths
+def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
+    """The lengths (k,) [mm] of lines from those of their parts."""
+    return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
 
 
-def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats]:
-    """The parts, and the 4 x 4 pose that takes them to where they are: an obstacle is asked where it rests."""
-    starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
-    if wrap is None:
-        return straight(starts, ends), np.eye(4)
-    pose = wrap.bone.pose(number)
-    back = np.linalg.inv(pose)
-    return wrap.obstacle.around(apply(back, starts), apply(back, ends)), pose
+def _frame(passed: Passed, paths: Paths | Winding, number: int, fibres: Polylines) -> Frame:
+    """The lines with as many points as the fibres have; ``lost_by_chords_max`` [mm]: the greatest length that chords cut off."""
+    points = paths.at(passed.part, passed.share)
+    lost = float((_lengths(passed, paths) - fibres.lengths(points)).max())
+    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost})
 
 
 def _on_bones(
-    bones: tuple[Bone, ...], wrap: Wrap | None, passed: Passed, number: int, tensions: Floats
+    bones: tuple[Bone, ...], wraps: Wraps, passed: Passed, paths: Paths | Winding, tensions: Floats
 ) -> dict[str, float]:
     """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
 
-    A part pulls at both of its ends along itself; its obstacle gets the opposite of both, as what lies on it has no weight.
+    A part pulls at both of its ends along itself; an obstacle gets the pulls of both sides, as what lies on it has no weight.
     """
     fixed, on_bone = passed.points, passed.on
-    paths, pose = _paths(wrap, fixed, number)
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]
-    first, last = (pulls * ends @ pose[:3, :3].T for ends in paths.directions())
+    first, last = (pulls * ends for ends in paths.directions())
     starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
     by = [(on_bone[:, :-1].ravel(), starts, first), (on_bone[:, 1:].ravel(), ends, -last)]
-    if wrap is not None:
-        around = np.full(len(starts), bones.index(wrap.bone))
-        by += [(around, starts, -first), (around, ends, last)]
+    if wraps.given:
+        of_obstacle = np.array([bones.index(bone) for bone in wraps.bones])
+        for touch in paths.touching():
+            around = of_obstacle[touch.obstacles]
+            by += [(around, touch.met, -pulls * touch.into), (around, touch.left, pulls * touch.out)]
     on, places, forces = (np.concatenate(parts) for parts in zip(*by, strict=True))
     found = dict[str, float]()
     for i, bone in enumerate(bones):
         found |= vector_scalars(f"force_on_{bone.name}", forces[on == i].sum(axis=0))
         found |= vector_scalars(f"moment_on_{bone.name}", np.cross(places, forces)[on == i].sum(axis=0))
     return found
-
-
-def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
-    """The line that has the fixed point deepest inside the obstacle; empty where none is inside."""
-    resting = apply(np.linalg.inv(wrap.bone.pose(number)), fixed.reshape(-1, 3))
-    depths = wrap.obstacle.depths(resting).reshape(len(fixed), -1).max(axis=1)
-    line = int(np.argmax(depths))
-    return "" if depths[line] <= _TOUCHES else f"a fixed point of line {line} {depths[line]:.3g} mm inside"
-
-
-def _wrap(problem: MuscleProblem, settings: LineSettings, place: str) -> Wrap | None:
-    """The obstacle of the settings, None without one."""
-    if (ball := settings.sphere) is not None:
-        bone = problem.bones[index(problem.bones, ball.bone, join(place, "sphere.bone"))]
-        return Wrap(WrappingSphere(ball.centre, ball.radius), bone, "sphere")
-    if (roll := settings.cylinder) is not None:
-        x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
-        bone = problem.bones[index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
-        return Wrap(WrappingCylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
-    return None
 
 
 SOLVES = (MuscleSolver(settings=LineSettings, solve=solve, moves="lines", check_problem=check, example={}),)

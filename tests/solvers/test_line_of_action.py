@@ -189,7 +189,7 @@ ROLL = {"bone": "top", "start": "0, 0, 0 mm", "end": "0, 0, 1 mm", "radius": "4 
         ({"via": [{"at": 0.5, "bone": "skull"}]}, r'via\[0\]\.bone: got "skull", want one of bottom, top'),
         ({"sphere": BALL | {"bone": "skull"}}, r'sphere\.bone: got "skull", want one of bottom, top'),
         ({"cylinder": ROLL | {"bone": "skull"}}, r'cylinder\.bone: got "skull", want one of bottom, top'),
-        ({"sphere": BALL, "cylinder": ROLL}, 'at most one of "sphere", "cylinder"'),
+        ({"sphere": BALL, "cylinder": ROLL}, 'at most one of "sphere", "cylinder", "obstacle"'),
         (
             {"via": [{"at": 0.5, "bone": "top"}, {"at": 0.5, "bone": "top"}]},
             "in the order in which a fibre passes them",
@@ -426,6 +426,10 @@ def test_a_straight_line_about_a_hinge_has_the_moment_of_its_arm(activation) -> 
         assert_allclose(moment[0] - np.cross(hinge, force)[0], tension * arm, rtol=1e-12)
 
 
+EGG = {"centre": "5, 8, 12 mm", "radii": ["8 mm", "6 mm", "4 mm"], "turn": "20, 0, 30 deg"}
+RING = {"centre": "5, 16, 15 mm", "axis": [0, 0.1, 1], "radius": "9 mm", "tube": "2 mm"}
+ROD = {"start": "0, 5, 21 mm", "end": "1, 5, 21.5 mm", "radius": "3 mm"}
+PEA = {"centre": "4, 7, 8 mm", "radius": "4 mm"}
 # Of three points lines leave out the middle one, on another bone than the rest, in all frames but number 5.
 LEFT_OUT = {"at": 0.5, "bone": "bottom", "joint": "counter", "within": ["4 rad", "6 rad"]}
 OBSTACLES = [
@@ -434,7 +438,25 @@ OBSTACLES = [
     {"via": [{"at": 0.3, "bone": "top"}, {"at": 0.6, "bone": "bottom"}]},
     {"sphere": {"bone": "bottom", "centre": "5, 8, 15 mm", "radius": "6 mm"}},
     {"cylinder": {"bone": "top", "start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}},
+    {"obstacle": [{"bone": "bottom", "ellipsoid": EGG}]},
+    {"obstacle": [{"bone": "top", "torus": RING}]},
+    {
+        "obstacle": [{"bone": "top", "cylinder": ROD}, {"bone": "bottom", "sphere": PEA}],
+        "via": [{"at": 0.6, "bone": "bottom"}],
+    },
+    {"obstacle": [{"bone": "top", "cylinder": ROD}, {"bone": "bottom", "sphere": PEA}]},
 ]
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES[3:])
+def test_lines_meet_the_obstacles_of_these_tests(obstacle) -> None:
+    paths = lines_of(bar(PULLED), obstacle | {"hill": HILL})
+    straight = lines_of(bar(PULLED), {"via": obstacle.get("via", [])})
+    assert (paths.lengths(5) > straight.lengths(5) + 0.1).all()
+
+
+def lines_of(given: MuscleProblem, settings: dict) -> line_of_action.Shortest:
+    return line_of_action.Shortest(given, parse(line_of_action.LineSettings, settings, ""))
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
@@ -451,7 +473,7 @@ def test_the_moment_is_the_force_times_minus_the_slope_of_the_length(obstacle) -
         problem = line_of_action.Shortest(
             given, parse(line_of_action.LineSettings, obstacle | {"hill": HILL | shares}, "")
         )
-        long = [line_of_action._frame(problem.lines.at(n), problem.wrap, n, given.fibres)[1][0] for n in (1, 3)]
+        long = [problem.lengths(n)[0] for n in (1, 3)]
         force, moment = exerted(frames[2], "top")
         tension = frames[2].scalars["muscle_force"]
         assert tension > 1

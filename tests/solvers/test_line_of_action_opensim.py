@@ -39,8 +39,7 @@ def ours(settings: dict) -> np.ndarray:
     line = line_of_action.Shortest(given, parse(line_of_action.LineSettings, settings, ""))
 
     def length(angle: float) -> float:
-        frame = 10 + 10 * angle
-        return float(line_of_action._frame(line.lines.at(frame), line.wrap, frame, given.fibres)[1][0])
+        return float(line.lengths(10 + 10 * angle)[0])
 
     step = 2e-5  # its square times a third derivative of about 30 mm: 1e-8 mm
     arms = [(length(angle - step) - length(angle + step)) / (2 * step) for angle in ANGLES]

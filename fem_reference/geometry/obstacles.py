@@ -1,0 +1,152 @@
+"""Smooth obstacles of paths, ellipsoids and cylinders as quadrics, and tori: levels, gradients, second derivatives."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along them there."""
+
+    obstacles: Ints
+    met: Floats
+    into: Floats
+    left: Floats
+    out: Floats
+
+
+class SmoothSurface(Protocol):
+    """A smooth surface where ``level`` is 0, inside which it is negative."""
+
+    @property
+    def bend(self) -> float:
+        """The smallest radius of curvature [mm]."""
+        ...
+
+    def level(self, points: Floats) -> tuple[Floats, Floats]:
+        """Values (n,) and gradients (n, 3) at ``points`` (n, 3)."""
+        ...
+
+    def moved(self, pose: Floats) -> Self:
+        """The surface where a ``pose`` (4, 4) takes it."""
+        ...
+
+    def bending(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
+        ...
+
+    def pushed(self, points: Floats) -> Floats:
+        """The ``points`` (n, 3), those inside moved to the surface."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Quadric:
+    """An ellipsoid of semi-axes ``radii`` (3,) [mm] along its own axes, which ``pose`` (4, 4) takes to where they are.
+
+    An infinite radius makes it a cylinder.
+    """
+
+    pose: Floats
+    radii: Floats
+
+    @property
+    def bend(self) -> float:
+        """The smallest radius of curvature [mm], at the ends of the longest finite axis."""
+        finite = self.radii[np.isfinite(self.radii)]
+        return float(finite.min() ** 2 / finite.max())
+
+    def moved(self, pose: Floats) -> Self:
+        """The surface where a ``pose`` (4, 4) takes it."""
+        return replace(self, pose=pose @ self.pose)
+
+    def level(self, points: Floats) -> tuple[Floats, Floats]:
+        """Values (n,) of the sum of (x / a)^2, less 1, and gradients (n, 3)."""
+        own = self._own(points)
+        return np.sum((own / self.radii) ** 2, axis=1) - 1, 2 * (own / self.radii**2) @ self.pose[:3, :3].T
+
+    def bending(self, _: Floats, directions: Floats) -> Floats:
+        """The second derivative (n,) along ``directions`` (n, 3), the same everywhere."""
+        return np.asarray(2 * np.sum((directions @ self.pose[:3, :3] / self.radii) ** 2, axis=1))
+
+    def pushed(self, points: Floats) -> Floats:
+        """The ``points`` (n, 3), those inside moved to the surface along its normal, from deep inside first away from the axis."""
+        own = self._own(points)
+        size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
+        scale = np.where(np.isfinite(self.radii), (0.8 / np.clip(size, 1e-9, 0.8))[:, None], 1.0)
+        moved = (own * scale) @ self.pose[:3, :3].T + self.pose[:3, 3]
+        inside = size < 1
+        for _ in range(3):
+            value, slope = self.level(moved)
+            moved = moved - (inside * value / np.maximum(np.sum(slope**2, axis=1), 1e-12))[:, None] * slope
+        return np.asarray(moved)
+
+    def _own(self, points: Floats) -> Floats:
+        return np.asarray((points - self.pose[:3, 3]) @ self.pose[:3, :3])
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """A torus about the third axis of ``pose`` (4, 4): a ``tube`` [mm] around a circle of ``radius`` [mm].
+
+    Paths go through its hole.
+    """
+
+    pose: Floats
+    radius: float
+    tube: float
+
+    @property
+    def bend(self) -> float:
+        """The radius of the tube [mm]."""
+        return self.tube
+
+    def moved(self, pose: Floats) -> Self:
+        """The surface where a ``pose`` (4, 4) takes it."""
+        return replace(self, pose=pose @ self.pose)
+
+    def level(self, points: Floats) -> tuple[Floats, Floats]:
+        """Values (n,) of the squared distance from the circle less that of the surface, and gradients (n, 3)."""
+        across = points - self._nearest(points)
+        return np.sum(across**2, axis=1) - self.tube**2, 2 * across
+
+    def bending(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivative (n,) at ``points`` (n, 3) along ``directions`` (n, 3)."""
+        outward, away = self._outward(points)
+        axis = self.pose[:3, 2]
+        out, up = np.sum(directions * outward, axis=1), directions @ axis
+        around = np.sum(directions**2, axis=1) - out**2 - up**2
+        return np.asarray(2 * (out**2 + up**2 + around * (1 - self.radius / away)))
+
+    def pushed(self, points: Floats) -> Floats:
+        """The ``points`` (n, 3), those inside moved to the surface, away from the circle."""
+        middle = self._nearest(points)
+        across = points - middle
+        size = np.linalg.norm(across, axis=1)[:, None]
+        return np.asarray(middle + across * np.maximum(self.tube / np.maximum(size, 1e-9), 1.0))
+
+    def through(self, starts: Floats, ends: Floats) -> Floats:
+        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the middles of those that do not."""
+        axis, centre = self.pose[:3, 2], self.pose[:3, 3]
+        low, high = (starts - centre) @ axis, (ends - centre) @ axis
+        crosses = low * high < 0
+        share = np.where(crosses, low / np.where(crosses, low - high, 1.0), 0.5)[:, None]
+        point = starts + share * (ends - starts)
+        outward, away = self._outward(point)
+        inner = centre + np.minimum(away, self.radius - self.tube)[:, None] * outward
+        return np.where(crosses[:, None], inner, point)
+
+    def _outward(self, points: Floats) -> tuple[Floats, Floats]:
+        """Unit vectors (n, 3) and distances (n,) from the axis."""
+        arm = points - self.pose[:3, 3]
+        flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
+        away = np.maximum(np.linalg.norm(flat, axis=1), 1e-12)
+        return flat / away[:, None], away
+
+    def _nearest(self, points: Floats) -> Floats:
+        """The points (n, 3) of the circle nearest to ``points`` (n, 3)."""
+        return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])

@@ -1,0 +1,75 @@
+"""Taut strings of points around obstacles: nearly the shortest paths, and the obstacles that they touch."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.obstacles import Ring, SmoothSurface
+
+Flags = NDArray[np.bool_]
+
+# Pieces of a string, its sweeps, and how far beyond the middle of its neighbours they take a point.
+_PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
+
+
+def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Floats:
+    """Points (n, N, 3) of strings that are nearly taut: each in the middle of its neighbours, or on an obstacle."""
+    rings = [one for one in obstacles if isinstance(one, Ring)]
+    string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
+    # A little aside, as a point in the middle of an obstacle has no side to go to.
+    aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
+    string[:, 1:-1] += aside[:, None]
+    for ring in rings:  # no piece may slip past a tube
+        while np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
+            string = halved(string)
+    for first in (1, 2) * _SWEEPS:
+        inner = np.arange(first, string.shape[1] - 1, 2)
+        middle = (string[:, inner - 1] + string[:, inner + 1]) / 2
+        points = (string[:, inner] + _BEYOND * (middle - string[:, inner])).reshape(-1, 3)
+        for obstacle in obstacles:
+            points = obstacle.pushed(points)
+        string[:, inner] = points.reshape(middle.shape)
+    return string
+
+
+def _piecewise(stations: list[Floats]) -> Floats:
+    """Points (n, N, 3) on straight pieces through ``stations`` (n, 3)."""
+    shares = (np.arange(_PIECES) / _PIECES)[:, None]
+    parts = [one[:, None] + shares * (other - one)[:, None] for one, other in pairwise(stations)]
+    return np.concatenate([*parts, stations[-1][:, None]], axis=1)
+
+
+def halved(string: Floats) -> Floats:
+    """The strings (n, N, 3) with a point in the middle of each piece, (n, 2 N - 1, 3)."""
+    finer = np.repeat(string, 2, axis=1)[:, :-1]
+    finer[:, 1::2] = (string[:, :-1] + string[:, 1:]) / 2
+    return finer
+
+
+def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
+    """The points (n, N) of strings that may touch an obstacle: nearer than a tangent is after a quarter of a piece."""
+    value, slope = obstacle.level(string.reshape(-1, 3))
+    away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
+    piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2
+    return np.asarray(away < (piece**2 / (16 * obstacle.bend))[:, None] + 1e-9)
+
+
+def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, ...]]:
+    """The obstacles that each path may meet, in turn."""
+    flags = np.array([touching(obstacle, halved(string)) for obstacle in obstacles])
+    count = flags.sum(axis=2)
+    middle = (flags * np.arange(flags.shape[2])).sum(axis=2) / np.maximum(count, 1)
+    order = np.argsort(middle, axis=0, kind="stable")
+    return [tuple(int(j) for j in column if count[j, i]) for i, column in enumerate(order.T)]
+
+
+def longest(flags: Flags) -> tuple[Ints, Ints]:
+    """The first and the last of the longest run of True in each row (n, N)."""
+    run = np.zeros(flags.shape, dtype=np.int64)
+    for i, column in enumerate(flags.T):
+        run[:, i] = np.where(column, run[:, i - 1] + 1, 0)
+    last = run.argmax(axis=1)
+    return last + 1 - run.max(axis=1), last

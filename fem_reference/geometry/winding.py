@@ -1,0 +1,270 @@
+"""The shortest paths around several smooth obstacles: straight and geodesic by turns, without a kink between them.
+
+A taut string finds the obstacles that a path meets, and nearly where; Newton's method then finds the point, direction and length
+of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219,
+DOI 10.1007/s11044-015-9451-1). A path is the shortest near the straight one, and meets an obstacle once at most.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.obstacles import SmoothSurface, Touch
+from fem_reference.geometry.taut_strings import Flags, halved, longest, met, taut, touching
+
+# Steps of a geodesic; the error of its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
+_STEPS = 60
+# Newton's iterations, their end [of the distance between the ends] and the step of their finite differences.
+_ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
+# So many points of a path are looked at for whether it crosses an obstacle.
+_CHECKED = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Winding:
+    """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
+
+    In turn they follow the obstacles ``met`` (n, m), each over as many knots; where there are less than m, all knots left are at
+    the end. ``failed`` (n,): not found by Newton's method.
+    """
+
+    knots: Floats
+    tangents: Floats
+    arcs: Floats
+    met: Ints
+    failed: Flags
+
+    @classmethod
+    def straight(cls, count: int, starts: Floats, ends: Floats) -> "Winding":
+        """The straight paths, with knots for ``count`` obstacles."""
+        knots = np.repeat(ends[:, None], 2 + count * (_STEPS + 1), axis=1)
+        knots[:, 0] = starts
+        away = np.linalg.norm(ends - starts, axis=1)
+        tangents = np.repeat(
+            ((ends - starts) / np.where(away > 0, away, 1.0)[:, None])[:, None], knots.shape[1], axis=1
+        )
+        arcs = np.repeat(away[:, None], knots.shape[1], axis=1)
+        arcs[:, 0] = 0
+        return cls(
+            knots, tangents, arcs, np.zeros((len(starts), count), dtype=np.int64), np.zeros(len(starts), dtype=bool)
+        )
+
+    def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
+        """The paths ``which`` along geodesics ``same`` on the obstacles of a ``pattern``."""
+        size = _STEPS + 1
+        steps = np.zeros((len(which), self.knots.shape[1] - 1))
+        for i, (points, tangents) in enumerate(pieces.run()):
+            on = slice(1 + i * size, 1 + (i + 1) * size)
+            self.knots[which, on] = points[:, same].swapaxes(0, 1)
+            self.tangents[which, on] = tangents[:, same].swapaxes(0, 1)
+            steps[:, on.start : on.stop - 1] = pieces.sizes[i, same, None] / _STEPS
+        for i in range(len(pattern) + 1):  # the straight pieces
+            gap = self.knots[which, i * size + 1] - self.knots[which, i * size]
+            steps[:, i * size] = np.linalg.norm(gap, axis=1)
+        self.tangents[which, 0] = self.tangents[which, 1]
+        self.tangents[which, len(pattern) * size + 1 :] = self.tangents[which, len(pattern) * size, None]
+        self.arcs[which] = np.cumsum(np.hstack([np.zeros((len(which), 1)), steps]), axis=1)
+        self.met[which, : len(pattern)] = pattern
+
+    @property
+    def lengths(self) -> Floats:
+        """Length (n,) [mm] of each path."""
+        return self.arcs[:, -1]
+
+    def directions(self) -> tuple[Floats, Floats]:
+        """Unit vectors (n, 3) along the paths at their starts and at their ends."""
+        return self.tangents[:, 0], self.tangents[:, -1]
+
+    def touching(self) -> list[Touch]:
+        """The obstacles that paths meet, in turn."""
+        size, found = _STEPS + 1, []
+        for i in range(self.met.shape[1]):
+            one, other = 1 + i * size, (i + 1) * size
+            knots, tangents = self.knots, self.tangents
+            found.append(Touch(self.met[:, i], knots[:, one], tangents[:, one], knots[:, other], tangents[:, other]))
+        return found
+
+    def at(self, which: Ints, shares: Floats) -> Floats:
+        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths: cubics between knots."""
+        wanted = shares * self.lengths[which]
+        low = np.clip((self.arcs[which] <= wanted[:, None]).sum(axis=1) - 1, 0, self.arcs.shape[1] - 2)
+        span = self.arcs[which, low + 1] - self.arcs[which, low]
+        u = ((wanted - self.arcs[which, low]) / np.where(span > 0, span, 1.0))[:, None]
+        one, other = self.knots[which, low], self.knots[which, low + 1]
+        first, last = (span[:, None] * self.tangents[which, low + i] for i in (0, 1))
+        near, far = (1 + 2 * u) * (1 - u) ** 2, u**2 * (3 - 2 * u)
+        return np.asarray(near * one + far * other + u * (1 - u) * ((1 - u) * first - u * last))
+
+
+@dataclass(eq=False)
+class _Pieces:
+    """Geodesics on the m ``obstacles`` that n paths meet in turn: where they begin, along what (m, n, 3), how long (m, n)."""
+
+    obstacles: list[SmoothSurface]
+    starts: Floats
+    ends: Floats
+    points: Floats
+    along: Floats
+    sizes: Floats
+
+    def run(self) -> list[tuple[Floats, Floats]]:
+        """Points and unit tangents (steps + 1, n, 3) of each geodesic."""
+        parts = zip(self.obstacles, self.points, self.along, self.sizes, strict=True)
+        return [_geodesic(*part) for part in parts]
+
+    def kinks(self) -> Floats:
+        """Distances (n, 4 m) [mm] of straight parts from the tangents at both ends of each geodesic, along normal and binormal."""
+        runs, found = self.run(), []
+        before = [self.starts, *(points[-1] for points, _ in runs)]
+        after = [*(points[0] for points, _ in runs[1:]), self.ends]
+        for obstacle, (points, tangents), one, other in zip(self.obstacles, runs, before, after, strict=False):
+            for i, straight in ((0, points[0] - one), (-1, other - points[-1])):
+                normal = _units(obstacle.level(points[i])[1])
+                binormal = np.cross(normal, tangents[i])
+                found += [np.sum(straight * normal, axis=1), np.sum(straight * binormal, axis=1)]
+        return np.stack(found, axis=1)
+
+    def rows(self, which: Ints) -> "_Pieces":
+        """The geodesics of the paths ``which``."""
+        parts = (values[:, which] for values in (self.points, self.along, self.sizes))
+        return _Pieces(self.obstacles, self.starts[which], self.ends[which], *parts)
+
+    def pressed(self) -> Flags:
+        """True (m, n) where a path lies on an obstacle by its tension: where the surface is convex along it, in the middle."""
+        middles = [(points[_STEPS // 2], tangents[_STEPS // 2]) for points, tangents in self.run()]
+        return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
+
+    def moved(self, change: Floats) -> "_Pieces":
+        """The geodesics after changes (n, 4 m): along, across [mm], direction [rad], length [mm] of each."""
+        points, along, sizes = [], [], []
+        for i, obstacle in enumerate(self.obstacles):
+            ahead, aside, turn, longer = (change[:, 4 * i + k] for k in range(4))
+            binormal = np.cross(_units(obstacle.level(self.points[i])[1]), self.along[i])
+            point = self.points[i] + ahead[:, None] * self.along[i] + aside[:, None] * binormal
+            for _ in range(3):  # back to the surface
+                value, slope = obstacle.level(point)
+                point = point - (value / np.sum(slope**2, axis=1))[:, None] * slope
+            direction = np.cos(turn)[:, None] * self.along[i] + np.sin(turn)[:, None] * binormal
+            points.append(point)
+            along.append(_tangent(direction, obstacle.level(point)[1]))
+            sizes.append(self.sizes[i] + longer)
+        return _Pieces(self.obstacles, self.starts, self.ends, np.array(points), np.array(along), np.array(sizes))
+
+
+def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which have none of both inside."""
+    string = taut(obstacles, starts, ends)
+    turns = met(obstacles, string)
+    found = Winding.straight(len(obstacles), starts, ends)
+    todo = [(pattern, np.flatnonzero([one == pattern for one in turns])) for pattern in sorted(set(turns))]
+    while todo:
+        pattern, which = todo.pop()
+        if not pattern:
+            continue
+        pieces, smooth = _solved(_guess([(j, obstacles[j]) for j in pattern], string[which]))
+        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): not met after all
+        for left_out in {tuple(column) for column in short.T.tolist()}:
+            same = np.flatnonzero(np.all(np.array(left_out) == short.T, axis=1))
+            if any(left_out):
+                rest = tuple(j for j, out in zip(pattern, left_out, strict=True) if not out)
+                todo.append((rest, which[same]))
+            else:
+                found.put(pattern, which[same], pieces, same)
+                found.failed[which[same]] = ~smooth[same]
+    found.failed[:] |= _wrong(obstacles, found, string)
+    return found
+
+
+def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
+    """The paths (n,) that cross an obstacle or are longer than the string, but for what its chords cut off."""
+    count, shares = len(string), np.linspace(0, 1, _CHECKED)
+    points = found.at(np.repeat(np.arange(count), _CHECKED), np.tile(shares, count))
+    wrong = found.lengths > 1.02 * np.linalg.norm(np.diff(string, axis=1), axis=2).sum(axis=1)
+    for obstacle in obstacles:
+        value, slope = obstacle.level(points)
+        away = value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
+        wrong |= (away < -1e-4 * obstacle.bend).reshape(count, _CHECKED).any(axis=1)
+    return wrong
+
+
+def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
+    """Geodesics near the parts of strings that touch the obstacles."""
+    fine, points, along, sizes = halved(string), [], [], []
+    for _, obstacle in met:
+        flags = touching(obstacle, fine)
+        first, last = longest(flags)
+        rows = np.arange(len(fine))
+        points.append(fine[rows, first])
+        along.append(fine[rows, np.minimum(first + 1, fine.shape[1] - 1)] - fine[rows, np.maximum(first - 1, 0)])
+        travelled = np.cumsum(np.linalg.norm(np.diff(fine, axis=1, prepend=fine[:, :1]), axis=2), axis=1)
+        sizes.append(travelled[rows, last] - travelled[rows, first])
+    pieces = _Pieces(
+        [one for _, one in met], fine[:, 0], fine[:, -1], np.array(points), np.array(along), np.array(sizes)
+    )
+    return pieces.moved(np.zeros((len(fine), 4 * len(met))))  # onto the surfaces
+
+
+def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
+    """The geodesics without kinks, by Newton's method, and True (n,) where there are none left."""
+    near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
+    most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
+    todo = np.arange(len(near))
+    for _ in range(_ITERATIONS):
+        part = pieces.rows(todo)
+        kinks = part.kinks()
+        left = np.abs(kinks).max(axis=1) > near[todo]
+        if not left.any():
+            return pieces, np.ones(len(near), dtype=bool)
+        part, kinks, todo = part.rows(np.flatnonzero(left)), kinks[left], todo[left]
+        count, size = kinks.shape
+        every = part.rows(np.tile(np.arange(count), size)).moved(_STEP * np.repeat(np.eye(size), count, axis=0))
+        slopes = (every.kinks().reshape(size, count, size) - kinks).transpose(1, 2, 0) / _STEP
+        change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
+        change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
+        part = _better(part, change, np.linalg.norm(kinks, axis=1))
+        pieces.points[:, todo], pieces.along[:, todo], pieces.sizes[:, todo] = part.points, part.along, part.sizes
+    return pieces, ~np.isin(np.arange(len(near)), todo)
+
+
+def _better(pieces: _Pieces, change: Floats, kinks: Floats) -> _Pieces:
+    """The geodesics after a ``change`` (n, 4 m) that is halved where ``kinks`` (n,) [mm] would not become smaller."""
+    for _ in range(5):
+        tried = pieces.moved(change)
+        worse = np.linalg.norm(tried.kinks(), axis=1) > kinks
+        if not worse.any():
+            break
+        change = np.where(worse[:, None], change / 2, change)
+    return tried
+
+
+def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+    """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,): Runge-Kutta's method."""
+    step, path = (sizes / _STEPS)[:, None], [(points, along)]
+
+    def bent(place: Floats, direction: Floats) -> Floats:
+        slope = obstacle.level(place)[1]
+        share = obstacle.bending(place, direction) / np.sum(slope**2, axis=1)
+        return np.asarray(-share[:, None] * slope)
+
+    for _ in range(_STEPS):
+        x, t = path[-1]
+        a = bent(x, t)
+        b = bent(x + step / 2 * t, t + step / 2 * a)
+        c = bent(x + step / 2 * t + step**2 / 4 * a, t + step / 2 * b)
+        d = bent(x + step * t + step**2 / 2 * b, t + step * c)
+        place, tangent = x + step * t + step**2 / 6 * (a + b + c), t + step / 6 * (a + 2 * b + 2 * c + d)
+        value, slope = obstacle.level(place)
+        path.append((place - (value / np.sum(slope**2, axis=1))[:, None] * slope, _tangent(tangent, slope)))
+    return np.array([x for x, _ in path]), np.array([t for _, t in path])
+
+
+def _tangent(directions: Floats, slopes: Floats) -> Floats:
+    """Unit vectors (n, 3) along the ``directions`` but for their parts along the ``slopes``."""
+    normals = _units(slopes)
+    return _units(directions - np.sum(directions * normals, axis=1)[:, None] * normals)
+
+
+def _units(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1)[..., None])

@@ -1,0 +1,149 @@
+"""Obstacles on bones that lines go around: their settings, the paths around them, and what is inside them."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BeforeValidator, model_validator
+from scipy.spatial.transform import Rotation
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.units import Point, PositiveLength, three
+from fem_reference.geometry.obstacles import Quadric, Ring
+from fem_reference.geometry.winding import Winding, around
+from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
+from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
+from fem_reference.solvers.common.lines import index
+
+# A fixed point this deep [mm] in an obstacle is on its surface, but for rounding.
+_TOUCHES = 1e-6
+
+
+class Ellipsoid(Record):
+    """An ellipsoid about ``centre`` whose half axes are ``radii``, along x, y, z before it is turned by the vector ``turn``."""
+
+    centre: Point
+    radii: tuple[PositiveLength, PositiveLength, PositiveLength]
+    turn: Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an angle"))] = (0.0, 0.0, 0.0)
+
+
+class Torus(Record):
+    """A ring, whose hole lines go through: ``tube`` is the radius of the tube around a circle of ``radius`` across ``axis``."""
+
+    centre: Point
+    axis: Axis
+    radius: PositiveLength
+    tube: PositiveLength
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.tube < self.radius:
+            raise ValueError('"tube" less than "radius", so that there is a hole')
+        return self
+
+
+class ObstacleOn(Record):
+    """One ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``, given at rest, that moves with a ``bone``.
+
+    ``start`` and ``end`` of a cylinder say where its axis is: it does not end there.
+    """
+
+    bone: str
+    sphere: CaseSphere | None = None
+    cylinder: Rod | None = None
+    ellipsoid: Ellipsoid | None = None
+    torus: Torus | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if len(self.model_fields_set) != 2:
+            raise ValueError('one of "sphere", "cylinder", "ellipsoid", "torus"')
+        return self
+
+    @property
+    def name(self) -> str:
+        """The kind of shape, by which messages name it."""
+        return next(iter(self.model_fields_set - {"bone"}))
+
+    def surface(self) -> Quadric | Ring:
+        """Its surface at rest."""
+        if (ball := self.sphere) is not None:
+            return Quadric(_pose(Rotation.identity(), ball.centre), np.full(3, ball.radius))
+        if (roll := self.cylinder) is not None:
+            return Quadric(
+                _pose(_onto(np.subtract(roll.end, roll.start)), roll.start), np.array([roll.radius] * 2 + [np.inf])
+            )
+        if (egg := self.ellipsoid) is not None:
+            return Quadric(_pose(Rotation.from_rotvec(egg.turn), egg.centre), np.array(egg.radii))
+        ring = self.torus
+        assert ring is not None
+        return Ring(_pose(_onto(np.array(ring.axis)), ring.centre), ring.radius, ring.tube)
+
+
+@dataclass(frozen=True, eq=False)
+class Wraps:
+    """The obstacles ``given`` on ``bones`` and their ``surfaces`` at rest; a sphere or a cylinder alone has a closed form."""
+
+    given: tuple[ObstacleOn, ...]
+    bones: tuple[Bone, ...]
+    surfaces: tuple[Quadric | Ring, ...]
+
+    def around(self, fixed: Floats, number: int) -> Paths | Winding:
+        """The shortest paths of all parts of lines through the points ``fixed`` (k, q + 1, 3), line by line, at a frame."""
+        starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
+        if not self.given:
+            return straight(starts, ends)
+        if len(self.given) > 1 or (closed := _closed(self.given[0])) is None:
+            return around(self._moved(number), starts, ends)
+        pose = self.bones[0].pose(number)
+        back = np.linalg.inv(pose)
+        return closed.around(apply(back, starts), apply(back, ends)).moved(pose)
+
+    def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
+        """The obstacle that has a fixed point deepest inside, and how deep of which line; empty where none is inside."""
+        found = []
+        for one, surface in zip(self.given, self._moved(number), strict=True):
+            points = fixed.reshape(-1, 3)
+            depths = np.linalg.norm(surface.pushed(points) - points, axis=1).reshape(len(fixed), -1).max(axis=1)
+            found.append((float(depths.max()), int(depths.argmax()), one.name))
+        depth, line, name = max(found, default=(0.0, 0, ""))
+        return (name, f"a fixed point of line {line} {depth:.3g} mm inside") if depth > _TOUCHES else ("", "")
+
+    def __str__(self) -> str:
+        return " and ".join(f"the {one.name} on {one.bone}" for one in self.given)
+
+    def _moved(self, number: int) -> list[Quadric | Ring]:
+        return [one.moved(bone.pose(number)) for one, bone in zip(self.surfaces, self.bones, strict=True)]
+
+
+def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], places: list[str]) -> Wraps:
+    """The obstacles of a muscle; InputError at one of ``places`` where there is no such bone."""
+    pairs = zip(given, places, strict=True)
+    bones = tuple(problem.bones[index(problem.bones, one.bone, join(place, "bone"))] for one, place in pairs)
+    return Wraps(given, bones, tuple(one.surface() for one in given))
+
+
+def _closed(given: ObstacleOn) -> WrappingSphere | WrappingCylinder | None:
+    """An obstacle at rest around which paths have a closed form."""
+    if (ball := given.sphere) is not None:
+        return WrappingSphere(ball.centre, ball.radius)
+    if (roll := given.cylinder) is not None:
+        x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
+        return WrappingCylinder(roll.start, (x, y, z), roll.radius)
+    return None
+
+
+def _pose(turn: Rotation, centre: tuple[float, float, float]) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn.as_matrix(), centre
+    return pose
+
+
+def _onto(axis: Floats) -> Rotation:
+    """A rotation that takes z to an ``axis`` (3,)."""
+    return Rotation.align_vectors([axis / np.linalg.norm(axis)], [[0, 0, 1]])[0]

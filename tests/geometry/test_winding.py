@@ -1,0 +1,119 @@
+"""Paths around several obstacles: closed forms, elliptic integrals, a second program's minimum, and what shortest paths have."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import ellipeinc
+
+from fem_reference.geometry import winding
+from fem_reference.geometry.obstacles import Quadric, Ring
+from fem_reference.geometry.winding import Winding, around
+from fem_reference.geometry.wrapping import WrappingCylinder, WrappingSphere
+
+RANDOM = np.random.default_rng(3)
+
+
+def at(*place: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = place
+    return pose
+
+
+EGG, BALL = Quadric(at(0, 1, 0), np.array([3.0, 4, 5])), Quadric(at(10, -2, 1), np.full(3, 4.0))
+
+
+def beside(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ends on both sides of the egg and the ball."""
+    return RANDOM.uniform(-4, 4, (count, 3)) + [-8, 0, 0], RANDOM.uniform(-4, 4, (count, 3)) + [20, 0, 0]
+
+
+def sampled(paths: Winding, count: int) -> np.ndarray:
+    size = len(paths.lengths)
+    points = paths.at(np.repeat(np.arange(size), count), np.tile(np.linspace(0, 1, count), size))
+    return points.reshape(size, count, 3)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+def test_around_a_ball_or_a_roll_it_is_the_closed_form(kind) -> None:
+    """The error of Runge-Kutta's method, 1e-7 of the radius for half a turn."""
+    starts, ends = (RANDOM.uniform(-4, 4, (60, 3)) + [x, 0, 0] for x in (-9, 9))
+    if kind == "sphere":
+        quadric, closed = Quadric(np.eye(4), np.full(3, 4.0)), WrappingSphere((0, 0, 0), 4.0)
+    else:
+        quadric, closed = Quadric(np.eye(4), np.array([4.0, 4, np.inf])), WrappingCylinder((0, 0, 0), (0, 0, 1), 4.0)
+    found, exact = around([quadric], starts, ends), closed.around(starts, ends)
+    assert not found.failed.any()
+    assert (exact.turns > 0).sum() > 20
+    assert_allclose(found.lengths, exact.lengths, rtol=1e-7)
+    for one, other in zip(found.directions(), exact.directions(), strict=True):
+        assert_allclose(one, other, atol=1e-6)
+    which, shares = np.arange(60), np.linspace(0, 1, 60)
+    assert_allclose(found.at(which, shares), exact.at(which, shares), atol=1e-5)
+
+
+@pytest.mark.parametrize(("a", "c"), [(5.0, 8.0), (6.0, 3.0)])
+def test_meridian_and_equator_of_a_spheroid(a, c) -> None:
+    """The arc of an ellipse is an elliptic integral, that of the equator a circle."""
+    spheroid = Quadric(np.eye(4), np.array([a, a, c]))
+    first, last = 0.3, 1.2
+    starts, ends = ([[a * math.sin(t), 0, c * math.cos(t)]] for t in (first, last))
+    paths = around([spheroid], np.array(starts), np.array(ends))
+    m = 1 - (c / a) ** 2
+    assert_allclose(paths.lengths, a * (ellipeinc(last, m) - ellipeinc(first, m)), rtol=1e-6)
+    angle = 0.9
+    paths = around([spheroid], np.array([[a, 0, 0.0]]), np.array([[a * math.cos(angle), a * math.sin(angle), 0]]))
+    if c > a:  # on an oblate one the equator is the shortest too, at this angle
+        assert_allclose(paths.lengths, a * angle, rtol=1e-6)
+
+
+@pytest.mark.parametrize("tube", [3.0, 1.0, 0.3])
+def test_over_the_tube_of_a_ring(tube) -> None:
+    """In a plane through its axis, a ring is a circle: tangents of sqrt(d^2 - r^2) and r (pi - 2 acos(r / d))."""
+    ring, away = Ring(np.eye(4), 10.0, tube), 9.0
+    exact = 2 * math.sqrt(away**2 - tube**2) + tube * (math.pi - 2 * math.acos(tube / away))
+    paths = around([ring], np.array([[10.0, 0, away]]), np.array([[10.0, 0, -away]]))
+    assert not paths.failed.any()
+    assert_allclose(paths.lengths, exact, rtol=1e-6)
+    middle = paths.at(np.array([0]), np.array([0.5]))
+    assert_allclose(middle, [[10 - tube, 0, 0]], atol=1e-6)  # through the hole, not around
+
+
+def test_through_the_hole_of_a_ring_it_is_straight() -> None:
+    ring = Ring(np.eye(4), 10.0, 2.0)
+    starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0]]), np.array([[-3.0, 1, -7], [0.0, 8, 0]])
+    paths = around([ring], starts, ends)  # the second between two points of the inner circle
+    assert not paths.failed.any()
+    assert_allclose(paths.lengths, np.linalg.norm(ends - starts, axis=1), rtol=1e-12)
+
+
+def test_around_two_it_is_smooth_outside_and_the_same_backwards() -> None:
+    starts, ends = beside(40)
+    paths = around([EGG, BALL], starts, ends)
+    assert not paths.failed.any()
+    assert (paths.arcs[:, winding._STEPS + 1] < paths.lengths).sum() > 20  # met two
+    points = sampled(paths, 1500)
+    steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    # Chords turn by less than 0.02: 0.02^2 / 24 = 2e-5 of their length.
+    assert_allclose(steps.sum(axis=1), paths.lengths, rtol=2e-5)
+    assert_allclose(steps, steps.mean(axis=1, keepdims=True).repeat(1499, axis=1), rtol=1e-3)
+    for obstacle in (EGG, BALL):
+        assert obstacle.level(points.reshape(-1, 3))[0].min() > -1e-6
+    assert_allclose(around([BALL, EGG], ends, starts).lengths, paths.lengths, rtol=1e-8)
+
+
+def test_directions_are_the_slopes_of_the_length() -> None:
+    """Moving an end changes the length by the direction there: differences over 2e-4 mm."""
+    starts, ends = beside(20)
+    paths, step = around([EGG, BALL], starts, ends), 1e-4
+    for axis in np.eye(3):
+        up, down = (around([EGG, BALL], starts, ends + sign * step * axis).lengths for sign in (1, -1))
+        assert_allclose((up - down) / (2 * step), paths.directions()[1] @ axis, atol=1e-6)
+        up, down = (around([EGG, BALL], starts + sign * step * axis, ends).lengths for sign in (1, -1))
+        assert_allclose((up - down) / (2 * step), -paths.directions()[0] @ axis, atol=1e-6)
+
+
+def test_what_crosses_an_obstacle_has_failed(monkeypatch) -> None:
+    monkeypatch.setattr(winding, "met", lambda _, string: [() for _ in string])
+    assert around([BALL], np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])).failed.tolist() == [True]
