@@ -1,5 +1,6 @@
 """The page ``estimation``: curves, radial basis functions and implicit surfaces of the report's chapter 3 and section 7.1."""
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fem_reference.assessment.estimation import CurveError, Estimation
+from fem_reference.assessment.estimation import Estimation
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
@@ -28,7 +29,9 @@ def page(found: Estimation) -> Page:
         "found": found,
         "techniques": TECHNIQUES,
         "answers": _columns(found),
-        "fibres": by_fibres(found),
+        "fibres": _rows(found.curves, "case", "known"),
+        "areas": _rows(found.heights, "case", "attachment", "centres"),
+        "choices": dict.fromkeys(one.choice for one in found.heights),
         "drawings": [_figure(), _curves(found), _blobs(), _fits(found)],
     }
     return Page(
@@ -71,10 +74,12 @@ def _style(i: int) -> dict[str, Any]:
     return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
 
 
-def by_fibres(found: Estimation) -> dict[tuple[str, int], list[CurveError]]:
-    """The errors of all techniques by case and known points."""
-    keys = dict.fromkeys((one.case, one.known) for one in found.curves)
-    return {key: [one for one in found.curves if (one.case, one.known) == key] for key in keys}
+def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:
+    """The errors by what they have under ``names``."""
+    found = dict[tuple[object, ...], list[Error]]()
+    for one in errors:
+        found.setdefault(tuple(getattr(one, name) for name in names), []).append(one)
+    return found
 
 
 def _figure() -> Drawing:
@@ -96,13 +101,14 @@ def _curves(found: Estimation) -> Drawing:
     """Errors against the number of known points, over all cases."""
 
     def draw(_: Figure, axes: Axes) -> None:
+        counts = sorted({one.known for one in found.curves})
         for i, name in enumerate(TECHNIQUES):
-            counts = sorted({one.known for one in found.curves})
             means = [
                 np.mean([one.rms for one in found.curves if (one.technique, one.known) == (name, n)]) for n in counts
             ]
             axes.plot(counts, means, marker="o", markersize=3, **_style(i), label=name)
         logarithmic(axes)
+        axes.set_xticks(counts)
         axes.set_xlabel("known points of a fibre")
         axes.set_ylabel("rms deviation of the others, mm")
         axes.legend(fontsize="x-small")
@@ -146,6 +152,7 @@ def _fits(found: Estimation) -> Drawing:
                 [one.gaussians for one in some], [one.rms for one in some], "o-", color=colour_of(i + 1), label=case
             )
         logarithmic(axes)
+        axes.set_xticks(sorted({one.gaussians for one in found.fits}))
         axes.set_xlabel("Gaussians")
         axes.set_ylabel("rms deviation of the surface, mm")
         axes.legend(fontsize="x-small")

@@ -174,12 +174,16 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
-    """A trial with each setting of its solver at each step of its ladder but the one that it has."""
+    """A trial with each setting of its solver at each step of its ladder but its own and those that its other settings exclude."""
     own = solvers.settings(base.choice, base.name)
     for key, values in solvers.trades(type(own)).items():
         for value in values:
             if value not in (getattr(own, key), base.choice.settings.get(key)):
                 choice = base.choice.model_copy(update={key: value})
+                try:
+                    solvers.settings(choice, base.name)
+                except InputError:
+                    continue
                 text = f"{value:.3g}" if isinstance(value, float) else str(value)
                 yield _by_element(base, choice, text) if key == "element" else base.varied(key, text, choice=choice)
 

@@ -22,7 +22,9 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert [one["status"] for one in numbers["answers"]] == ["converged", "diverged"]
     assert all(word in text for word in ("0.123", "0.0789", "4.56", "file: diverged"))
     assert "why it was" in text
-    assert "1e+05" in text
+    assert text.count("<td>0.100<small>100\N{NARROW NO-BREAK SPACE}000</small></td>") == 2
+    for one in found().heights:  # a column for each choice of centres, its condition below its error
+        assert f"<th>{one.choice}<small>rms, mm</small></th>" in text
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.
     assert estimation_page.said(found()).startswith("of curves through a few points of a fibre constant deviates least")
     assert "22 to 22 times fewer numbers" in estimation_page.said(found())

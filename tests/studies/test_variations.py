@@ -132,6 +132,7 @@ def test_a_candidate_has_the_ladders_that_its_solver_declares() -> None:
     # The case has 100 Gaussians and ten iterations, and straight lines; what it has already is no variation.
     assert values("rbf_muscle") == {"gaussians": {"10", "30"}, "iterations": {"3", "30"}}
     assert values("straight_lines") == {"via_count": {"2", "4", "8"}}
+    assert values("via_points") == {}, "via-points by name exclude a number of them"
     assert [one.name for one in trials if not one.knob].count("rbf_muscle") == 1, "that of Table 5.1 is the case's own"
 
 
