@@ -59,7 +59,7 @@ async function assembled() {
   const bones = await Promise.all(data.bones.map(bone));
   const ghost = new three.Mesh(runs[0].mesh.geometry, look("#000000", { transparent: true, opacity: 0.25, depthWrite: false }));
   ghost.renderOrder = 1;
-  scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh]), ...bones.map((each) => each.mesh), ghost);
+  scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh, run.arrows]), ...bones.map((each) => each.mesh), ghost);
   const controls = new three.OrbitControls(camera, renderer.domElement);
   controls.enableZoom = false; // until the picture has the focus: else nobody could scroll past it
   renderer.domElement.style.touchAction = "pan-y";
@@ -79,7 +79,7 @@ async function muscle(run, faces) {
   const mesh = new three.Mesh(geometry, look(MUSCLE));
   mesh.frustumCulled = false;
   const packed = await Promise.all(Object.entries(run.levels).map(async ([name, text]) => [name, await levels(text)]));
-  const own = { levels: Object.fromEntries(packed), strands: await fibres(run), bins: new Float32Array(BINS), greatest: 0, label: label(run.name) };
+  const own = { levels: Object.fromEntries(packed), strands: await fibres(run), arrows: arrows(run), bins: new Float32Array(BINS), greatest: 0, label: label(run.name) };
   return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true }), ...own };
 }
 
@@ -158,6 +158,7 @@ function place(run) {
     color.needsUpdate = true;
   }
   if (isOn("fibres")) lay(run);
+  pull(run);
   describe(run, chosen);
 }
 
@@ -230,6 +231,7 @@ function pane({ run, left, top }) {
   const bottom = rows * height - top - height, compared = run !== runs[0] && runs[0].reached[frame];
   runs.forEach((each) => {
     each.mesh.visible = each === run && run.reached[frame];
+    each.arrows.visible = each.mesh.visible && isOn("forces");
     each.strands.mesh.visible = each.mesh.visible && isOn("fibres");
   });
   const within = quantity()?.name === "depth"; // what is in a bone is seen through it
@@ -270,6 +272,7 @@ function listen() {
   part("front").addEventListener("click", () => lookFrom(data.camera.directions[0]));
   part("side").addEventListener("click", () => lookFrom(data.camera.directions[1]));
   part("bones").addEventListener("change", draw);
+  part("forces")?.addEventListener("change", draw);
   part("fibres").addEventListener("change", () => show(view.frame));
   part("laid")?.addEventListener("change", arrange);
   part("quantity")?.addEventListener("change", choose);

@@ -11,7 +11,8 @@ What ``viewer.js`` unpacks is one JSON object. Arrays in it are little-endian, c
                vertices are outside of the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the
                frame before, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
-    and what ``viewer_fields`` says: quantities, levels and fibre points of the runs, bars, fibres, joints
+    force      the greatest force drawn [N]
+    and what ``viewer_fields`` says: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
 
@@ -34,7 +35,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.coarsening import thin
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
-from fem_reference.report.viewer_fields import Fields, joints
+from fem_reference.report.viewer_fields import Fields, arrows, joints
 from fem_reference.runs.store import Run
 
 THREE = Path(__file__).parent / "three"
@@ -49,7 +50,8 @@ _LEVELS = 65535
 class Viewer:
     """The contents of its template: the ``data`` for the script, the names of the ``candidates`` drawn and of the ``quantities`` to
     colour by, the frame numbers, one frame in how many is drawn, the greatest error of a coordinate [mm], the colours of
-    fibres, where on their scale [%] which stretches are, and the library's version and licence.
+    fibres, where on their scale [%] which stretches are, the greatest force drawn [N], 0 without any, and the library's version
+    and licence.
     """
 
     data: str
@@ -60,6 +62,7 @@ class Viewer:
     error: float
     warm: tuple[str, ...]
     stretches: tuple[tuple[float, float], ...]
+    force: float
     version: str
     licence: str
 
@@ -100,6 +103,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
     for run, row, own_points in zip(shown, runs, points, strict=True):
         row["levels"] = {name: _packed(levels) for name, levels in fields.levels(run).items()}
         row["most"] = fields.most(run)
+        row["forces"] = arrows(run, comparison.setup, numbers)
         row["points"] = _positions(_last_finite(own_points), box)
     distance = [{"name": "distance", "signed": False, "top": top}] if len(shown) > 1 else []
     version, licence = _library_facts()
@@ -110,6 +114,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
         "both": _stops("coolwarm"),
         "warm": _stops("plasma"),
         "quantities": distance + fields.quantities(),
+        "force": _greatest_force(runs),
         "bars": fields.bars(),
         "fibres": fields.fibres(points),
         "joints": joints(comparison.setup.bones, numbers),
@@ -121,7 +126,14 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
     }
     names, chosen = tuple(run.name for run in shown[1:]), tuple(one["name"] for one in data["quantities"])
     warm, ends = tuple(data["warm"]), _ends(data["fibres"])
-    return Viewer(_json(data), names, chosen, numbers, every, box.step / 2, warm, ends, version, licence)
+    return Viewer(_json(data), names, chosen, numbers, every, box.step / 2, warm, ends, data["force"], version, licence)
+
+
+def _greatest_force(runs: list[dict[str, Any]]) -> float:
+    """The greatest magnitude [N] of the arrows of all ``runs``, 0 without any."""
+    return max(
+        (float(np.linalg.norm(one[3:])) for row in runs for frame in row["forces"] for one in frame), default=0.0
+    )
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:

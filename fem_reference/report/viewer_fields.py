@@ -5,6 +5,7 @@ runs        levels by quantity: (f, n) of one byte, as differences from the fram
             magnitude; points: of the fibres, as positions
 bars        by quantity and frame, how far [mm] the reference may be from the truth; null where it is not known, nothing without any
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
+forces      of each run by frame the arrows: point of application [mm] and force on a bone [N], six numbers each
 joints      of each bone that moves its name, unit, and by frame the angle or the distance
 """
 
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.export import forces
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.io.texts import finite
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import Bone
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report.at_frames import motions
 from fem_reference.runs.store import Run
 
@@ -143,6 +145,15 @@ def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, 
         }
         for one in motions(bones)
     ]
+
+
+def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[float]]]:
+    """Point of application (3) [mm] and force (3) [N] of each bone with a force, by frame; none where it is 0 or not known."""
+    found = dict[int, list[list[float]]]()
+    for i, number in enumerate(run.numbers):
+        if number in numbers and (pull := forces.block(run, setup, i)) is not None:
+            found[number] = np.round(np.hstack([pull.points, pull.of_points["force"]]), 4).tolist()
+    return [found.get(number, []) for number in numbers]
 
 
 def _spread(first: int, end: int) -> NDArray[np.int64]:

@@ -1,4 +1,5 @@
 // Colours, scale and histogram of what the 3D view shows: part of viewer.js.
+const FORCE = "#1f6fd1", LONGEST = 0.6; // of half the picture's height
 const BINS = 48, GREATEST_LEVEL = 127;
 const WORDS = { distance: "worst vertex", surface: "farthest from the surface", depth: "deepest in a bone" };
 
@@ -135,4 +136,35 @@ function lay(run) {
 function fibreLegend() {
   part("stretch").hidden = !isOn("fibres");
   if (isOn("fibres")) histogram(part("stretches"), panes().filter((run) => run.reached[view.frame]).map((run) => run.stretches));
+}
+
+// ---- Forces
+
+// As many arrows as a frame has at most, in front of everything, along y until they are turned.
+function arrows(run) {
+  const group = new three.Group(), thick = 0.012 * data.camera.half;
+  for (let i = Math.max(0, ...run.forces.map((frame) => frame.length)); i > 0; i--) {
+    const arrow = new three.Group();
+    for (const shape of [new three.CylinderGeometry(thick, thick, 1, 8).translate(0, 0.5, 0), new three.ConeGeometry(3 * thick, 6 * thick, 16)]) {
+      const mesh = new three.Mesh(shape, look(FORCE, { transparent: true, depthTest: false }));
+      mesh.renderOrder = 2;
+      mesh.frustumCulled = false;
+      arrow.add(mesh);
+    }
+    group.add(arrow);
+  }
+  return group;
+}
+
+function pull(run) {
+  const found = run.forces[view.frame];
+  run.arrows.children.forEach((arrow, i) => {
+    arrow.visible = i < found.length;
+    if (!arrow.visible) return;
+    const force = new three.Vector3(...found[i].slice(3)), length = (LONGEST * data.camera.half * force.length()) / data.force;
+    arrow.position.set(...found[i].slice(0, 3));
+    arrow.quaternion.setFromUnitVectors(new three.Vector3(0, 1, 0), force.normalize());
+    arrow.children[0].scale.y = Math.max(length, 1e-6);
+    arrow.children[1].position.y = length;
+  });
 }

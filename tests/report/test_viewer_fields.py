@@ -59,3 +59,14 @@ def test_fibres_and_joints_are_those_of_the_case(comparison):
     assert len(drawn) == viewer_fields.FIBRES
     assert len(indices) == viewer_fields.FIBRES * viewer_fields.POINTS
     assert {0, 39, 79 * 40, 80 * 40 - 1} <= set(indices.tolist())  # the first and the last, from end to end
+
+
+def test_arrows_begin_where_the_force_has_no_moment(comparison):
+    """2 N along y at the point (3, 0, 0) in the second frame; at rest there is no force, and so no arrow."""
+    pulls = np.outer([0.0, 2, 0, 0, 0], [0.0, 1, 0])
+    vectors = {"force": pulls, "moment": np.cross([3.0, 0, 0], pulls)}
+    scalars = {f"{kind}_on_plate_{axis}": vectors[kind][:, i] for kind in vectors for i, axis in enumerate("xyz")}
+    run = replace(comparison.reference, scalars=comparison.reference.scalars | scalars)
+    assert viewer_fields.arrows(run, comparison.setup, run.numbers) == [[], [[3, 0, 0, 0, 2, 0]], [], [], []]
+    assert viewer_fields.arrows(run, comparison.setup, run.numbers[1:2]) == [[[3, 0, 0, 0, 2, 0]]]
+    assert viewer_fields.arrows(comparison.reference, comparison.setup, run.numbers) == [[]] * 5
