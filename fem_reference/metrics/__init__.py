@@ -36,7 +36,7 @@ class Statistic:
     ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
     ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
     position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
-    for the value of a single fibre.
+    for the value of a single fibre, or of the force on a bone: nothing averages there.
     """
 
     unit: str

@@ -22,7 +22,13 @@ STATISTICS = {
         shown={"curve": 26, "angle": 26, "rank": 50},
     ),
     "force": Statistic(
-        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
+        "N",
+        "Joint",
+        "force",
+        curve="Force of the muscle on the bone of the joint",
+        shown={"curve": 27, "angle": 27},
+        local=True,
+        lone=True,
     ),
 }
 OF, AGAINST = "lines", "reference"
