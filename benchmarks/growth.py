@@ -27,6 +27,8 @@ BODIES = ((1, 4), (1, 10), (2, 16), (3, 24), (4, 36))
 ELEMENT = "P2/P1"
 # Iterations of a short and of a longer run, and how often each is made.
 COUNTS, REPEATS = (1, 5), 2
+# The cost of rods grows with the number of fibres.
+GROWING = {name: one for name, one in SOLVERS.items() if one.solver != "viper"}
 # The size at which a cost is extrapolated, and how a fit is shown.
 LARGE = 1e7
 NUMBERS = ("exponent", "standard error", "at 1e7", "at 1e7, at least", "at 1e7, at most")
@@ -48,7 +50,7 @@ def of_reference(sizes: tuple[tuple[int, int], ...] = BODIES) -> list[Point]:
 
 def of_candidate(name: str, most: int | None = None) -> list[Point]:
     """A candidate in an iteration [s], and its memory [MB], with the first ``most`` sizes, by default all."""
-    chosen = SOLVERS[name]
+    chosen = GROWING[name]
     settings, tets = solvers.settings(chosen, name), chosen.solver == "mass_spring"
     made: list[problem_setup.Setup] = (
         [spindle(*size) for size in SPINDLES] if tets else [ellipsoid(k) for k in SUBDIVISIONS]
@@ -113,14 +115,14 @@ class Candidates:
 
     def setup_cache(self) -> dict[str, list[Point]]:
         """The costs of each at all sizes."""
-        return {name: of_candidate(name) for name in SOLVERS}
+        return {name: of_candidate(name) for name in GROWING}
 
-    @over("s, MB or 1", solver=SOLVERS, cost=OF_CANDIDATES, number=NUMBERS)
+    @over("s, MB or 1", solver=GROWING, cost=OF_CANDIDATES, number=NUMBERS)
     def track_growth(self, points: dict[str, list[Point]], solver: str, cost: str, number: str) -> float:
         """A number of the fit of a cost."""
         return shown(law(points[solver], cost), number)
 
-    @over("s, MB or 1", solver=SOLVERS, body=range(len(SUBDIVISIONS)), cost=("size", *OF_CANDIDATES))
+    @over("s, MB or 1", solver=GROWING, body=range(len(SUBDIVISIONS)), cost=("size", *OF_CANDIDATES))
     def track_cost(self, points: dict[str, list[Point]], solver: str, body: int, cost: str) -> float:
         """A cost of a body."""
         return points[solver][body][cost]

@@ -19,7 +19,7 @@ def test_the_numbers_of_a_fit_are_shown_by_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(growth.SOLVERS))
+@pytest.mark.parametrize("name", list(growth.GROWING))
 def test_candidates_of_the_table_are_measured(name) -> None:
     points = growth.of_candidate(name, most=3)
     assert len(points) == 3
