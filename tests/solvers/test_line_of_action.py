@@ -524,6 +524,29 @@ def alike(given: MuscleProblem, turn: np.ndarray, shift: np.ndarray, factor: flo
     return replace(given, surface=surface, bones=tuple(bones.values()), attached=attached, fibres=fibres)
 
 
+def grown(settings: dict, turn: np.ndarray, shift: np.ndarray, factor: float) -> dict:
+    """Settings with their places, lengths and directions turned, moved and scaled."""
+
+    def one(key: str, value: object) -> object:
+        if isinstance(value, dict):
+            return grown(value, turn, shift, factor)
+        if key == "axis":
+            return (turn @ np.array(value, float)).tolist()
+        if isinstance(value, list):
+            return [one(key, entry) for entry in value]
+        if key == "turn":
+            own = Turn.from_rotvec([float(angle) for angle in value.removesuffix(" deg").split(",")], degrees=True)
+            vector = (Turn.from_matrix(turn) * own).as_rotvec(degrees=True)
+            return ", ".join(repr(float(angle)) for angle in vector) + " deg"
+        if isinstance(value, str) and value.endswith(" mm"):
+            numbers = factor * np.array([float(number) for number in value.removesuffix(" mm").split(",")])
+            placed = turn @ numbers + shift if key in {"centre", "start", "end"} else numbers
+            return ", ".join(repr(float(number)) for number in placed) + " mm"
+        return value
+
+    return {key: one(key, value) for key, value in settings.items()}
+
+
 @pytest.mark.parametrize("obstacle", OBSTACLES)
 def test_a_scene_turned_moved_scaled_and_renumbered_has_the_same_arms_forces_and_moments(obstacle) -> None:
     """Lengths and arms to scale, forces as its square (so is F0), moments as its cube; turned as the scene is."""
@@ -531,13 +554,7 @@ def test_a_scene_turned_moved_scaled_and_renumbered_has_the_same_arms_forces_and
     turn = Turn.random(rng=np.random.default_rng(3)).as_matrix()
     order = np.random.default_rng(4).permutation(len(given.surface.points))
     other = alike(given, turn, shift, factor, order)
-    great = {key: dict(value) if isinstance(value, dict) else value for key, value in obstacle.items()}
-    for kind in {"sphere", "cylinder"} & {*great}:
-        shape = great[kind]
-        for key in {"centre", "start", "end"} & {*shape}:
-            place = np.array([float(one) for one in shape[key].removesuffix(" mm").split(",")])
-            shape[key] = ", ".join(repr(float(one)) for one in factor * turn @ place + shift) + " mm"
-        shape["radius"] = f"{factor * float(shape['radius'].removesuffix(' mm'))} mm"
+    great = grown(obstacle, turn, shift, factor)
     stronger = HILL | {"max_force": f"{500 * factor**2} N"}
     (_, small_one), (_, frames) = solved(given, hill=HILL, **obstacle), solved(other, hill=stronger, **great)
     assert_allclose(lengths(other, frames), factor * lengths(given, small_one), rtol=1e-9)
