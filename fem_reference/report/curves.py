@@ -72,7 +72,7 @@ def _found(comparison: Comparison, metric: str, statistic: str) -> dict[str, Mea
 def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
-    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,); of means also the range of the fibres."""
+    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,); the reference's mean with its fibres' range."""
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
             continue
@@ -81,7 +81,7 @@ def _draw_runs(
             _band(axes, along[shown], one.values[shown], bar[shown])
         kept = replace(one, values=one.values[shown])
         _line(axes, along[shown], kept, run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
-        for end in ("least", "greatest") if one.statistic == "mean" else ():
+        for end in ("least", "greatest") if one.statistic == "mean" and i == 0 else ():
             if other := find(comparison.changes[run.name], one.metric, end):
                 label = "_" if _RANGE in axes.get_legend_handles_labels()[1] else _RANGE
                 axes.plot(along[shown], other.values[shown], ":", color=colour, linewidth=0.8, label=label)
