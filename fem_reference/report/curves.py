@@ -72,7 +72,7 @@ def _found(comparison: Comparison, metric: str, statistic: str) -> dict[str, Mea
 def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
-    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,); the reference's mean with its fibres' range."""
+    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,), and the range of the reference's fibres."""
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
             continue
