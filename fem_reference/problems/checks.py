@@ -11,7 +11,15 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
+from fem_reference.problems.body import (
+    Body,
+    Cells,
+    Prescribed,
+    boundary_facets,
+    check_element,
+    check_quadrature,
+    reference_nodes,
+)
 from fem_reference.problems.contact import ContactBone, ContactLaw
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
@@ -24,9 +32,9 @@ _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each ot
 _THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
 
 
-def check(body: Body, element: str) -> None:
+def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
     """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that
-    it names exist, and its constraints can be distinguished, followed and solved.
+    it names exist, its constraints can be distinguished, followed and solved, and quadrature of that degree suits the element.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -47,6 +55,7 @@ def check(body: Body, element: str) -> None:
     _check_needs(body)
     check_agreement(body)
     _check_start(body)
+    check_quadrature(element, quadrature_degree, "quadrature_degree")
 
 
 def check_box(counts: object, size: object, kind: object, degree: object) -> None:

@@ -1,5 +1,7 @@
 """What a body from Python cannot be is refused before it is solved, by argument, what was got and what is wanted."""
 
+import cProfile
+import pstats
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,9 @@ from fem_reference import effects
 from fem_reference.problems.body import ByCell
 from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Along, Rest
+from fem_reference.runs.store import Outcome
+from fem_reference.solvers.fenicsx.processes import installed
+from fem_reference.solvers.fenicsx.session import Session
 
 ALL, STILL = (0, 1, 2), ((0.0, 0.0, 0.0),) * 3
 NAN, INF = float("nan"), float("inf")
@@ -199,3 +204,21 @@ def test_bones_and_a_start_are_what_they_should_be() -> None:
     refused(replace(BODY, bones=(3,)), r"bones\[0\]: got int 3, want ContactBone records")
     refused(replace(BODY, start=lambda points: points * NAN), "start: got places .*, not all finite")
     refused(replace(BODY, start=lambda _: np.zeros(3)), r"start: got places \(3,\)")
+
+
+@pytest.mark.skipif(not installed(), reason="FEniCSx is not installed")
+def test_each_check_of_a_body_runs_once(monkeypatch) -> None:
+    monkeypatch.setattr(Session, "run", lambda *_: Outcome("diverged", "nothing was solved"))
+    with cProfile.Profile() as profile:
+        fr.solve_body(BODY, element="P1")
+    calls = {name: entry[1] for (_, _, name), entry in pstats.Stats(profile).stats.items()}  # type: ignore[attr-defined]
+    once = "check check_frames check_element check_quadrature check_agreement _check_start require_installed"
+    assert {name: calls.get(name, 0) for name in once.split()} == dict.fromkeys(once.split(), 1)
+
+
+def test_quadrature_suits_the_element() -> None:
+    body = replace(BODY, effects=(*BODY.effects, fr.make_effect("incompressible", bulk=1.0)))
+    check(body, "P1/P1", 2)
+    check(body, "P2/P1", 1)
+    with pytest.raises(fr.InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
+        check(body, "P1/P1", 1)

@@ -10,7 +10,7 @@ import cloudpickle
 import numpy as np
 
 from fem_reference.foundations.subprocesses import scratch_folder
-from fem_reference.problems.body import Body, check_quadrature
+from fem_reference.problems.body import Body
 from fem_reference.problems.checks import check
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
@@ -38,8 +38,7 @@ class Session:
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
         """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
-        check(body, settings.element)
-        check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
+        check(body, settings.element, settings.quadrature_degree)
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
@@ -96,9 +95,11 @@ def shared() -> Iterator[None]:
 
 def opened(ranks: int = 1) -> AbstractContextManager[Session]:
     """The shared session, for one rank where there is one, else a new one. MissingSoftware where FEniCSx is not installed."""
-    require_installed()
     common = _shared.get() if ranks == 1 else None
-    return nullcontext(common) if common else session(ranks)
+    if common is None:
+        return session(ranks)
+    require_installed()
+    return nullcontext(common)
 
 
 def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check_quadrature
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.checks import check
 from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march
@@ -47,8 +47,7 @@ class ScikitBodySettings(Record):
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     """The states of ``body`` at its frames, as far as they can be reached."""
-    check(body, settings.element)
-    check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
+    check(body, settings.element, settings.quadrature_degree)
     if body.contact is not None:
         raise InputError("contact", "bones", "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
