@@ -73,8 +73,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere or a cylinder: along the great circle through
-    both, or one of them where they are opposite each other; along a helix. Points inside count as on the surface.
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both or
+    one of them where they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
