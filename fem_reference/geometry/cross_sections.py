@@ -5,7 +5,6 @@ from functools import cached_property
 
 import igl
 import numpy as np
-from scipy.sparse.linalg import spsolve
 
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
 
@@ -55,14 +54,8 @@ class CrossSection:
 
     def square(self, turns: Floats) -> Floats:
         """The place (n, 2) in the unit square of each point, by a harmonic map; ``turns`` (k,) are those of the rim."""
-        found = np.zeros((len(self.points), 2))
-        found[self.rim] = np.stack([np.interp(turns, _SHARES, side) for side in _SQUARE], axis=1)
-        inner = np.setdiff1d(np.arange(len(self.points)), self.rim)
-        matrix = igl.cotmatrix(self.points, self.triangles.astype(np.int64)).tocsc()
-        if len(inner):
-            right = -(matrix[inner][:, self.rim] @ found[self.rim])
-            found[inner] = np.asarray(spsolve(matrix[inner][:, inner], right)).reshape(-1, 2)
-        return found
+        rim = np.stack([np.interp(turns, _SHARES, side) for side in _SQUARE], axis=1)
+        return np.asarray(igl.harmonic(self.points, self.triangles.astype(np.int64), self.rim, rim, 1))
 
 
 def _around(loop: Floats) -> Floats:

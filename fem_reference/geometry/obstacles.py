@@ -1,7 +1,7 @@
 """Smooth obstacles of paths, ellipsoids and cylinders as quadrics, and tori: levels, gradients, second derivatives."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -17,31 +17,6 @@ class Touch:
     into: Floats
     left: Floats
     out: Floats
-
-
-class SmoothSurface(Protocol):
-    """A smooth surface where ``level`` is 0, inside which it is negative."""
-
-    @property
-    def bend(self) -> float:
-        """The smallest radius of curvature [mm]."""
-        ...
-
-    def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) and gradients (n, 3) at ``points`` (n, 3)."""
-        ...
-
-    def moved(self, pose: Floats) -> Self:
-        """The surface where a ``pose`` (4, 4) takes it."""
-        ...
-
-    def bending(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
-        ...
-
-    def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,3 +125,7 @@ class Ring:
     def _nearest(self, points: Floats) -> Floats:
         """The points (n, 3) of the circle nearest to ``points`` (n, 3)."""
         return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])
+
+
+# A smooth surface where its level is 0, inside which that is negative.
+SmoothSurface = Quadric | Ring

@@ -70,14 +70,13 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
     bench = Bench(scenes.pop(LAPLACE), store)
     base = bench.reference()
     bars = refinement.bars(bench, base, model=False) if base.outcome.status == "converged" else None
-    widths = {} if bars is None else known(bars)
     for source, scene in scenes.items():
         log.info("%s: the reference with fibres by %s", case.name, source)
         run, found = Bench(scene, store).reference(), dict[str, float]()
         if base.outcome.status == run.outcome.status == "converged":
             context = context_of(bench.setup(), base)
             found = greatest(_carrying(run), _carrying(base), context, {name.split(".")[0] for name in ANSWERS})
-        picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, widths))
+        picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, known(bars)))
         yield AnswerChange(case.name, source, LAPLACE, run.outcome.status, *picked)
 
 

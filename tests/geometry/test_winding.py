@@ -7,10 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ellipeinc
 
-from fem_reference.geometry import winding
+from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
 from fem_reference.geometry.winding import Winding, around
-from fem_reference.geometry.wrapping import WrappingCylinder, WrappingSphere
 
 RANDOM = np.random.default_rng(3)
 
@@ -39,11 +38,8 @@ def sampled(paths: Winding, count: int) -> np.ndarray:
 def test_around_a_ball_or_a_roll_it_is_the_closed_form(kind) -> None:
     """The error of Runge-Kutta's method, 1e-7 of the radius for half a turn."""
     starts, ends = (RANDOM.uniform(-4, 4, (60, 3)) + [x, 0, 0] for x in (-9, 9))
-    if kind == "sphere":
-        quadric, closed = Quadric(np.eye(4), np.full(3, 4.0)), WrappingSphere((0, 0, 0), 4.0)
-    else:
-        quadric, closed = Quadric(np.eye(4), np.array([4.0, 4, np.inf])), WrappingCylinder((0, 0, 0), (0, 0, 1), 4.0)
-    found, exact = around([quadric], starts, ends), closed.around(starts, ends)
+    quadric = Quadric(np.eye(4), np.array([4.0, 4, 4 if kind == "sphere" else np.inf]))
+    found, exact = around([quadric], starts, ends), wrapping.around(quadric, starts, ends)
     assert not found.failed.any()
     assert (exact.turns > 0).sum() > 20
     assert_allclose(found.lengths, exact.lengths, rtol=1e-7)

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.foundations.motion import Rotation, apply
-from fem_reference.geometry.wrapping import WrappingCylinder, WrappingSphere
+from fem_reference.geometry.obstacles import Quadric
+from fem_reference.geometry.wrapping import around
 from fem_reference.metrics import MeasurementContext, at_rest, measure
 from fem_reference.metrics.moment_arm import excursion_arms, turning
 from fem_reference.problems.setup import Bone, Joint
@@ -86,11 +87,9 @@ def test_the_error_is_of_second_order_in_the_angle() -> None:
 def test_a_line_around_an_obstacle_has_the_radius_of_that_obstacle(obstacle: str) -> None:
     """In the plane across the axis the path's length is linear in the angle while it wraps: the slope is exact."""
     radius, joint = 20.0, joint_of(np.radians(np.linspace(0, 20, 9)))
-    round_it = (
-        WrappingSphere((0, 0, 0), radius) if obstacle == "sphere" else WrappingCylinder((0, 0, -1), (0, 0, 1), radius)
-    )
+    quadric = Quadric(np.eye(4), np.array([radius, radius, radius if obstacle == "sphere" else np.inf]))
     starts, end = np.array([[-50.0, -10, 0]]), np.array([[50.0, -10, 0]])
-    lengths = np.array([round_it.around(starts, apply(joint.bone.pose(i), end)).lengths for i in range(9)])
+    lengths = np.array([around(quadric, starts, apply(joint.bone.pose(i), end)).lengths for i in range(9)])
     run = straight(joint, 9)
     assert_allclose(np.abs(excursion_arms(lengths, context_of(joint, run), run.numbers)), radius, rtol=1e-6)
 

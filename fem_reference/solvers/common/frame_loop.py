@@ -130,9 +130,7 @@ def tetrahedron() -> MuscleProblem:
     bone = Bone("bone", surface, None, solid=clear)
     attached = (AttachedVertices("end", bone, np.zeros(1, np.int64)),)
     mesh, fibre = TetMesh(corners, np.arange(4)[None], facets), Polylines(corners[:2], np.array([0, 2]))
-    return MuscleProblem(
-        surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre, mesh_facts={}, seconds=0.0
-    )
+    return MuscleProblem(surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre)
 
 
 @dataclass(eq=False)

@@ -9,12 +9,12 @@ from pydantic import BeforeValidator, model_validator
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.units import Point, PositiveLength, three
+from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
-from fem_reference.geometry.winding import Winding, around
-from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
+from fem_reference.geometry.winding import Winding
+from fem_reference.geometry.wrapping import Paths
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
@@ -97,12 +97,11 @@ class Wraps:
         """The shortest paths of all parts of lines through the points ``fixed`` (k, q + 1, 3), line by line, at a frame."""
         starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
         if not self.given:
-            return straight(starts, ends)
-        if len(self.given) > 1 or (closed := _closed(self.given[0])) is None:
-            return around(self._moved(number), starts, ends)
-        pose = self.bones[0].pose(number)
-        back = np.linalg.inv(pose)
-        return closed.around(apply(back, starts), apply(back, ends)).moved(pose)
+            return wrapping.straight(starts, ends)
+        moved = self._moved(number)
+        if len(moved) == 1 and isinstance(moved[0], Quadric) and self.given[0].name in ("sphere", "cylinder"):
+            return wrapping.around(moved[0], starts, ends)
+        return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
         """The obstacle that has a fixed point deepest inside, and how deep of which line; empty where none is inside."""
@@ -126,16 +125,6 @@ def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], places: list
     pairs = zip(given, places, strict=True)
     bones = tuple(problem.bones[index(problem.bones, one.bone, join(place, "bone"))] for one, place in pairs)
     return Wraps(given, bones, tuple(one.surface() for one in given))
-
-
-def _closed(given: ObstacleOn) -> WrappingSphere | WrappingCylinder | None:
-    """An obstacle at rest around which paths have a closed form."""
-    if (ball := given.sphere) is not None:
-        return WrappingSphere(ball.centre, ball.radius)
-    if (roll := given.cylinder) is not None:
-        x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
-        return WrappingCylinder(roll.start, (x, y, z), roll.radius)
-    return None
 
 
 def _pose(turn: Rotation, centre: tuple[float, float, float]) -> Floats:
