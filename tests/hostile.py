@@ -24,6 +24,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, check_closed, check_finite
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
+from fem_reference.io.formats import formats
 from fem_reference.problems import anatomy, muscle, scalar
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import Setup
@@ -240,7 +241,7 @@ def _finite(text: str) -> None:
 
 def _make_surface(suffix: str, **settings: Any) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
-        if settings:
+        if settings or formats()[suffix].write is None:
             mesh = meshio.Mesh(BALL.points, [("triangle", BALL.triangles)])
             mesh.write(folder / f"ball{suffix}", **settings)
         else:
@@ -430,10 +431,7 @@ def _meshes() -> dict[str, Kind]:
     made: dict[str, Callable[[Path], None]] = {suffix: _make_surface(suffix) for suffix in files.surface_suffixes()}
     made |= {"binary.ply": _make_surface(".ply", binary=True), "binary.stl": _make_surface(".stl", binary=True)}
     made |= {"meshio.vtu": _make_surface(".vtu", binary=True), "text.vtu": _make_surface(".vtu", binary=False)}
-    made |= {
-        "text.vtk": _make_surface(".vtk", binary=False),
-        "old.msh": _make_surface(".msh", file_format="gmsh22", binary=False),
-    }
+    made["text.vtk"] = _make_surface(".vtk", binary=False)
     found = {f"surface {name}": Kind(make, "ball*", read_surface) for name, make in made.items()}
     return found | {f"lines {suffix}": Kind(_make_lines(suffix), "lines*", read_lines) for suffix in (".vtk", ".vtp")}
 

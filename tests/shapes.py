@@ -1,7 +1,9 @@
 """Bodies for tests, made with numpy alone: boxes of tetrahedra and spheres of triangles."""
 
 import itertools
+from pathlib import Path
 
+import meshio
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
@@ -57,6 +59,11 @@ def sphere(subdivisions: int, radius: float = 1.0) -> Surface:
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
     faces[inward] = faces[inward][:, ::-1]
     return Surface(radius * corners / np.linalg.norm(corners, axis=1)[:, None], faces, "sphere")
+
+
+def write(path: Path, surface: Surface, points: Floats) -> None:
+    """A file of a ``surface`` with its points at ``points``, by meshio: as other programs write it."""
+    meshio.Mesh(points, [("triangle", surface.triangles)]).write(path)
 
 
 def _subdivide(points: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarray]:

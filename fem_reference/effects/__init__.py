@@ -14,7 +14,6 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -26,7 +25,7 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.material_point import State as State
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Record, parse
+from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
 __path__ += outside.folders()
@@ -110,8 +109,7 @@ class Ramped(Effect):
     @field_validator("ramp")
     @classmethod
     def _check_ramp(cls, ramp: tuple[RampPoint, ...]) -> tuple[RampPoint, ...]:
-        if any(late.frame <= early.frame for early, late in pairwise(ramp)):
-            raise ValueError("knots whose frames are each later than the one before")
+        increasing([knot.frame for knot in ramp], "knots whose frames are each later than the one before")
         return ramp
 
     def amount(self, frame: float) -> float:
@@ -261,6 +259,11 @@ def find(name: str) -> type[Record]:
     if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
         raise KeyError(name)
     return _record(name)
+
+
+def name_of(effect: Record | type[Record]) -> str:
+    """The name of an ``effect``, or of its kind, in scene files: that of its file."""
+    return effect.__module__.rpartition(".")[2]
 
 
 def example(name: str) -> dict[str, Any]:

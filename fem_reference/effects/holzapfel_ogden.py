@@ -1,11 +1,13 @@
 """Two families of fibres at an angle to the fibre direction that stiffen as they are stretched, as in arteries and fascia."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from functools import partial
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
 from fem_reference.effects import Energy, State
+from fem_reference.foundations.records import directed
 from fem_reference.foundations.units import Angle, PositivePressure
 
 
@@ -22,14 +24,7 @@ class HolzapfelOgden(Energy):
     k1: PositivePressure
     k2: float = Field(gt=0)
     angle: Angle
-    normal: tuple[float, float, float]
-
-    @field_validator("normal")
-    @classmethod
-    def _check_normal(cls, normal: tuple[float, float, float]) -> tuple[float, float, float]:
-        if not 1e-9 < max(abs(entry) for entry in normal) < 1e9:
-            raise ValueError("a normal that is not zero, with a largest entry from 1e-9 to 1e9")
-        return normal
+    normal: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name="a normal"))]
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack families."""

@@ -12,6 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from fem_reference.effects import name_of
 from fem_reference.effects.contact import Contact
 from fem_reference.effects.fibre_passive import FibrePassive
 from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
@@ -22,7 +23,6 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export import febio_mesh
 from fem_reference.export.febio_contact import add_contact, has_contact, notes
 from fem_reference.export.febio_material import add_fibres, add_materials
-from fem_reference.export.open_formats import effect_name
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
@@ -43,10 +43,10 @@ def check(case: MuscleCase) -> None:
     """InputError where a case has an effect that FEBio has not, or not in the same form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
-            same = ", ".join(kind.__module__.rpartition(".")[2] for kind in SAME)
+            same = ", ".join(name_of(kind) for kind in SAME)
             raise InputError(
                 join(case.place, f"effect[{i}]"),
-                f'"{effect_name(effect)}"',
+                f'"{name_of(effect)}"',
                 f"what FEBio has in the same form: {same}",
             )
     for kinds, got in (

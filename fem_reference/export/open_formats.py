@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, name_of
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
@@ -103,16 +103,11 @@ def _are_obstacles(problem: MuscleProblem) -> list[bool]:
     return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
 
 
-def effect_name(effect: Effect) -> str:
-    """The name of an effect in case files."""
-    return type(effect).__module__.rpartition(".")[2]
-
-
 def _effect(effect: Effect) -> dict[str, Any]:
     """The name of an effect, its law in words, and its parameters, each with its value and unit."""
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
-    return {"name": effect_name(effect), "law": type(effect).__doc__, "parameters": parameters}
+    return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters}
 
 
 def write_lines(path: Path, lines: Polylines) -> None:

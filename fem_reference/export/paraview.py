@@ -21,7 +21,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
-from fem_reference.io.formats.vtk import DataBlock, Tree
+from fem_reference.io.formats.vtk import DataBlock, Tree, write_blocks
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
@@ -49,7 +49,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
         for i, number in enumerate(comparison.reference.numbers):
             name = f"frames/{frame_file(number, '.vtm')}"
             (part / "frames").mkdir(exist_ok=True)
-            files.write_blocks(part / name, frames.blocks(i))
+            write_blocks(part / name, frames.blocks(i))
             entries.append((number if case.frames.interval is None else number * case.frames.interval, name))
             log.info("%s: frame %d written", case.name, number)
         files.write_pvd(part / INDEX, entries)

@@ -1,11 +1,13 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
+from itertools import pairwise
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError, model_validator
 
 from fem_reference.foundations.errors import InputError
 
@@ -19,6 +21,32 @@ class Record(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, arbitrary_types_allowed=True
     )
+
+
+def one_of(*keys: str) -> Any:
+    """A check of a record: exactly one of its ``keys`` has a value."""
+
+    def check(record: Any) -> Any:
+        if sum(getattr(record, key) is not None for key in keys) != 1:
+            named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
+            raise ValueError(f"exactly one of {named}")
+        return record
+
+    return model_validator(mode="after")(check)
+
+
+def increasing(values: Sequence[float] | None, want: str) -> Any:
+    """The ``values``, if there are any; ValueError where each is not above the one before."""
+    if values is not None and any(late <= early for early, late in pairwise(values)):
+        raise ValueError(want)
+    return values
+
+
+def directed(vector: tuple[float, float, float], name: str) -> tuple[float, float, float]:
+    """The ``vector`` that is the ``name`` of a direction; ValueError where it has none to speak of."""
+    if not 1e-9 < math.hypot(*vector) < 1e9:
+        raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
+    return vector
 
 
 def check_name(name: str) -> str:

@@ -31,7 +31,7 @@ _SETTLED = 10.0
 
 
 def surface_suffixes() -> tuple[str, ...]:
-    """The suffixes of the files that ``read_surface`` reads and ``write_surface`` writes."""
+    """The suffixes of the files that ``read_surface`` reads."""
     return tuple(formats())
 
 
@@ -47,10 +47,6 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
     if suffix not in known:
         raise InputError(path, f'the suffix "{path.suffix}"', want)
     return formats()[suffix]
-
-
-def _suffixes_of_lines() -> list[str]:
-    return [suffix for suffix, one in formats().items() if suffix in one.lines]
 
 
 def read_surface(path: Path, unit: float) -> Surface:
@@ -79,11 +75,9 @@ def read_moved_polylines(path: Path, unit: float) -> Polylines:
 
 
 def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Polylines:
-    known = _suffixes_of_lines()
-    want = f"polylines, whole, as {' or '.join(known)}"
-    read = _format(path, want, known).read_lines
-    assert read is not None  # of a suffix in ``lines``
-    points, lines = _attempt(lambda file: checked(read(file)), path, want)
+    want = f"polylines, whole, as {' or '.join(vtk.LINES)}"
+    _format(path, want, vtk.LINES)
+    points, lines = _attempt(lambda file: checked(vtk.read_lines(file)), path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
 
@@ -130,29 +124,24 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
     """The surface with its points at ``positions`` (n, 3) [mm] in the format of the suffix; in VTK's with point data
     ``displacement`` [mm], float64.
     """
-    write = _format(path, f"one of {' '.join(formats())}", formats()).write
+    written = [suffix for suffix, one in formats().items() if one.write]
+    write = _format(path, f"one of {' '.join(written)}", written).write
+    assert write is not None  # of a suffix that is written
     with whole(path) as part:
         write(part, surface.moved_to(positions), positions - surface.points)
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
     """VTP or VTK of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    known = _suffixes_of_lines()
-    write = _format(path, f"one of {' '.join(known)}", known).write_lines
-    assert write is not None  # of a suffix in ``lines``
+    _format(path, f"one of {' '.join(vtk.LINES)}", vtk.LINES)
     with whole(path) as part:
-        write(part, Polylines(positions, polylines.offsets), positions - polylines.points)
+        vtk.write_lines(part, Polylines(positions, polylines.offsets), positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
     with whole(path) as part:
         vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
-
-
-def write_blocks(path: Path, blocks: vtk.Tree) -> None:
-    """VTM of ``blocks`` by name, with a folder of their files beside it; not whole or not at all, as it is more than one file."""
-    vtk.write_blocks(path, blocks)
 
 
 def write_field(

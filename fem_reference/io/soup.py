@@ -28,15 +28,6 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
     return points.astype(np.float64), triangles
 
 
-def check_lines(points: Floats, lines: list[list[int]]) -> None:
-    """ValueError where a line is of fewer than two points, or of one that is not among ``points`` (n, 3)."""
-    for number, line in enumerate(lines):
-        if len(line) < 2:
-            raise ValueError(f"line {number} of {len(line)} points")
-        if min(line) < 0 or max(line) >= len(points):
-            raise ValueError(f"line {number} with a point that does not exist, of {len(points)}")
-
-
 def check_lengths(read: Lines) -> Lines:
     """The points (n, 3) and lines that were ``read``; ValueError where a point is not finite or a line has no length."""
     points, lines = read
@@ -78,25 +69,9 @@ def positions(rows: list[list[float]]) -> Any:
     return np.array(rows)
 
 
-def displacement(data: dict[str, Any], points: Floats) -> Any:
-    """The displacement among point ``data`` of a step; ValueError where there is none of the shape of ``points``."""
-    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
-    if name is None:
-        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
-    return data[name]
-
-
 def rows(points: Floats) -> list[str]:
     """One text a point (n, 3), in as many digits as bring the same float back."""
     return [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist()]
-
-
-def of_meshio(mesh: Any) -> Soup:
-    """Points and triangles of a meshio mesh (points and line cells passed over)."""
-    blocks = [block for block in mesh.cells if block.type not in ("vertex", "line")]
-    if other := {block.type for block in blocks} - {"triangle"}:
-        raise ValueError(f"cells of type {', '.join(sorted(other))}")
-    return mesh.points, np.concatenate([np.empty((0, 3), np.int64), *(block.data for block in blocks)])
 
 
 class PointLists(NamedTuple):

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import soup
 from fem_reference.io.texts import beside, parsed_xml
@@ -20,9 +22,21 @@ def read(path: Path) -> list[tuple[float, Floats, Ints]]:
     for item in parsed_xml(path).iter("DataItem"):
         _check(item, path)
     with meshio.xdmf.TimeSeriesReader(path) as series:
-        points, triangles = soup.arrays(soup.of_meshio(meshio.Mesh(*series.read_points_cells())))
+        points, blocks = series.read_points_cells()
+        if other := {block.type for block in blocks} - {"triangle", "line", "vertex"}:
+            raise ValueError(f"cells of type {', '.join(sorted(other))}")
+        corners = [block.data for block in blocks if block.type == "triangle"]
+        points, triangles = soup.arrays((points, np.concatenate([np.empty((0, 3), np.int64), *corners])))
         steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
-    return [(time, points + soup.displacement(data, points), triangles) for time, data in steps]
+    return [(time, points + _displacement(data, points), triangles) for time, data in steps]
+
+
+def _displacement(data: dict[str, Any], points: Floats) -> Any:
+    """The displacement among point ``data`` of a step; ValueError where there is none of the shape of ``points``."""
+    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
+    if name is None:
+        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
+    return data[name]
 
 
 def _check(item: Element, path: Path) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures, percentile, rms
-from fem_reference.metrics.edge_extension import worst_edges
+from fem_reference.metrics import Measure, MeasurementContext, Statistic
+from fem_reference.metrics.edge_extension import over_edges
 from fem_reference.runs.store import Run
 
 STATISTICS = {
@@ -36,15 +36,9 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     angles, wanted = (np.array([edges.angles(points) for points in each.positions]) for each in (run, reference))
     turned = np.degrees(wrapped(angles - wanted))
     size = np.abs(turned)
-    values = {
-        "mean": turned @ edges.areas / edges.areas.sum(),
-        "mean_magnitude": size @ edges.areas / edges.areas.sum(),
-        "rms": rms(turned, edges.areas),
-        "p95": np.array([percentile(each, edges.areas, 0.95) for each in size]),
-        "max": size.max(axis=1),
-        "mean_magnitude_of_edges": size.mean(axis=1),
-    }
-    return measures("dihedral_angle", values, worst_edges(edges, turned, reference))
+    mean = size @ edges.areas / edges.areas.sum()
+    more = {"mean_magnitude": mean, "mean_magnitude_of_edges": size.mean(axis=1)}
+    return over_edges("dihedral_angle", turned, edges, reference, **more)
 
 
 def wrapped(angles: Floats) -> Floats:

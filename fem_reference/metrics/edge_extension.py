@@ -31,20 +31,21 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     edges = Edges.of(reference.surface)
     lengths, wanted = (np.array([edges.lengths(points) for points in each.positions]) for each in (run, reference))
     longer = 100 * (lengths - wanted) / edges.lengths(reference.surface.points)
+    return over_edges("edge_extension", longer, edges, reference, mean_of_edges=longer.mean(axis=1))
+
+
+def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
+    """The measures of the metric ``name`` that ``deviations`` (f, e) by edge have, and ``more`` (f,); all are worst at the edge of the
+    greatest magnitude, at its place in the reference.
+    """
+    size = np.abs(deviations)
     values = {
-        "mean": longer @ edges.areas / edges.areas.sum(),
-        "rms": rms(longer, edges.areas),
-        "p95": np.array([percentile(each, edges.areas, 0.95) for each in np.abs(longer)]),
-        "max": np.abs(longer).max(axis=1),
-        "mean_of_edges": longer.mean(axis=1),
+        "mean": deviations @ edges.areas / edges.areas.sum(),
+        "rms": rms(deviations, edges.areas),
+        "p95": np.array([percentile(each, edges.areas, 0.95) for each in size]),
+        "max": size.max(axis=1),
     }
-    return measures("edge_extension", values, worst_edges(edges, longer, reference))
-
-
-def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """In each frame the edge with the ``deviations`` (f, e) of greatest magnitude, and its place in the reference, in words."""
-    ends = edges.ends[np.argmax(np.abs(deviations), axis=1)]
+    ends = edges.ends[size.argmax(axis=1)]
     middles = reference.positions[np.arange(len(ends))[:, None], ends].mean(axis=1)
-    return tuple(
-        f"edge {one} to {other} at {place_of(at)}" for (one, other), at in zip(np.sort(ends), middles, strict=True)
-    )
+    places = zip(np.sort(ends), middles, strict=True)
+    return measures(name, values | more, [f"edge {one} to {other} at {place_of(at)}" for (one, other), at in places])

@@ -2,16 +2,16 @@
 
 import json
 from collections.abc import Mapping
-from itertools import pairwise
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Name, Record
+from fem_reference.foundations.records import Name, Record, increasing
 from fem_reference.io import files, texts
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
@@ -50,19 +50,16 @@ class Contents(Record):
     status: Status
     message: str
     frames: tuple[int, ...]
-    numbers: tuple[Annotated[int, Field(ge=0, le=LAST_FRAME)], ...] = Field(min_length=1, max_length=MOST_FRAMES)
+    numbers: Annotated[
+        tuple[Annotated[int, Field(ge=0, le=LAST_FRAME)], ...],
+        Field(min_length=1, max_length=MOST_FRAMES),
+        AfterValidator(partial(increasing, want="frame numbers that increase")),
+    ]
     scalars: dict[str, tuple[float | None, ...]]
     residuals: tuple[tuple[float, ...], ...] = ()
     cost: dict[str, float]
     origin: Origin
     parts: tuple[str, ...]
-
-    @field_validator("numbers")
-    @classmethod
-    def _check_numbers(cls, numbers: tuple[int, ...]) -> tuple[int, ...]:
-        if any(late <= early for early, late in pairwise(numbers)):
-            raise ValueError("frame numbers that increase")
-        return numbers
 
     @model_validator(mode="after")
     def _check_scalars(self) -> Self:

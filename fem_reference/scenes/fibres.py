@@ -1,11 +1,12 @@
 """The sources of a muscle's fibres in a case: a file, a Laplace field, or a decomposition of its volume."""
 
 import math
-from typing import Literal, Self
+from functools import partial
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, directed, one_of
 from fem_reference.foundations.units import Angle, LengthUnit
 
 # A template more inclined than this [rad] would have no fibre that is as long as the muscle is wide.
@@ -38,7 +39,7 @@ class KohoutKukacka(Record):
     contours: int = Field(ge=4, le=1000)
     template: Literal["parallel", "pennate"]
     pennation: Angle | None = None
-    towards: tuple[float, float, float] | None = None
+    towards: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name='"towards"'))] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -47,8 +48,6 @@ class KohoutKukacka(Record):
             raise ValueError('"pennation" and "towards" with the template "pennate", no "pennation" with "parallel"')
         if self.pennation is not None and not 0 < self.pennation <= _STEEPEST:
             raise ValueError('"pennation" above 0 and up to 60 degrees')
-        if self.towards is not None and not 1e-9 < math.hypot(*self.towards) < 1e9:
-            raise ValueError('"towards" that is not zero, with a length from 1e-9 to 1e9')
         return self
 
 
@@ -67,12 +66,7 @@ class Fibres(Record):
     kohout_kukacka: KohoutKukacka | None = None
     chmd: Chmd | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        sources = tuple(type(self).model_fields)
-        if sum(getattr(self, source) is not None for source in sources) != 1:
-            raise ValueError(f"exactly one of {', '.join(f'"{source}"' for source in sources)}")
-        return self
+    _check = one_of("polylines", "traced", "kohout_kukacka", "chmd")
 
     @property
     def ends(self) -> dict[str, str]:

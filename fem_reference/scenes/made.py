@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fem_reference.effects import find, names
+from fem_reference.effects import find, name_of, names
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import path, said
 from fem_reference.foundations.records import Record
@@ -37,7 +37,7 @@ def _effect(entry: Any) -> Any:
     """An effect as the table that a file has."""
     if isinstance(entry, Record):
         values = {key: value for key, value in entry.model_dump().items() if value is not None}
-        entry = {"name": type(entry).__module__.rpartition(".")[2]} | values
+        entry = {"name": name_of(entry)} | values
     if isinstance(entry, Mapping) and entry.get("name") in names(Record):
         return _with_units(find(str(entry["name"])), dict(entry))
     return entry

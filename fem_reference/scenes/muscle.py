@@ -2,14 +2,13 @@
 
 import math
 from functools import partial
-from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.motion import Rotation, Translation
-from fem_reference.foundations.records import Name, Record
+from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
@@ -22,13 +21,7 @@ LAST_FRAME = 1_000_000_000
 Vector = tuple[float, float, float]
 
 
-def _checked_direction(direction: Vector, name: str) -> Vector:
-    if not 1e-9 < math.hypot(*direction) < 1e9:
-        raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
-    return direction
-
-
-Axis = Annotated[Vector, AfterValidator(partial(_checked_direction, name="an axis"))]
+Axis = Annotated[Vector, AfterValidator(partial(directed, name="an axis"))]
 
 
 class Keyframe(Record):
@@ -44,7 +37,7 @@ class Motion(Record):
 
     axis: Axis | None = None
     centre: Point | None = None
-    direction: Annotated[Vector, AfterValidator(partial(_checked_direction, name="a direction"))] | None = None
+    direction: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))] | None = None
     keyframes: tuple[Keyframe, ...] = Field(min_length=2)
 
     @field_validator("keyframes")
@@ -62,8 +55,7 @@ class Motion(Record):
         slides = self.direction is not None
         if (self.axis is None, self.centre is None) != (slides, slides):
             raise ValueError('either "axis" and "centre" (a rotation) or "direction" (a translation)')
-        if any(late.frame <= early.frame for early, late in pairwise(self.keyframes)):
-            raise ValueError("keyframes in the order of their frames")
+        increasing([key.frame for key in self.keyframes], "keyframes in the order of their frames")
         return self
 
     def poses(self) -> Rotation | Translation:
@@ -79,7 +71,7 @@ class CaseHalfSpace(Record):
     """All that lies behind the plane through ``point`` across ``normal``, which points out of it."""
 
     point: Point
-    normal: Annotated[Vector, AfterValidator(partial(_checked_direction, name="a normal"))]
+    normal: Annotated[Vector, AfterValidator(partial(directed, name="a normal"))]
 
 
 class CaseBox(Record):
@@ -144,11 +136,10 @@ class CaseBone(Record):
     distance_error: PositiveLength = 0.05
     distance_rounding: PositiveLength = 1.0
 
+    _check_form = one_of("surface", *CLOSED_FORMS)
+
     @model_validator(mode="after")
     def _check(self) -> Self:
-        forms = ("surface", *CLOSED_FORMS)
-        if sum(getattr(self, form) is not None for form in forms) != 1:
-            raise ValueError(f"exactly one of {', '.join(f'"{form}"' for form in forms)}")
         if (self.surface is None) != (self.unit is None):
             raise ValueError('"unit" beside "surface" and only there')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
@@ -209,11 +200,7 @@ class Attachment(Record):
     within: PositiveLength | None = None
     outline: Outline | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if sum(one is not None for one in (self.vertices, self.within, self.outline)) != 1:
-            raise ValueError('exactly one of "vertices", "within", "outline"')
-        return self
+    _check = one_of("vertices", "within", "outline")
 
 
 class Frames(Record):

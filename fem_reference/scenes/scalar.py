@@ -1,13 +1,13 @@
 """A scalar case as frozen records: where a field lives, which effects act on it, its boundary conditions, and what is expected."""
 
-from itertools import pairwise
-from typing import Literal, Self
+from functools import partial
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, increasing, one_of
 from fem_reference.scenes.case import Case, Standard
 
 
@@ -48,22 +48,16 @@ class Domain(Record):
     """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
-    nodes: tuple[float, ...] | None = Field(default=None, min_length=2)
+    nodes: (
+        Annotated[
+            tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
+        ]
+        | None
+    ) = None
     mesh: MeshFiles | None = None
     surface: SurfaceFile | None = None
 
-    @field_validator("nodes")
-    @classmethod
-    def _check_nodes(cls, nodes: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if nodes is not None and any(late <= early for early, late in pairwise(nodes)):
-            raise ValueError("nodes that increase")
-        return nodes
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if sum(one is not None for one in (self.interval, self.nodes, self.mesh, self.surface)) != 1:
-            raise ValueError('exactly one of "interval", "nodes", "mesh", "surface"')
-        return self
+    _check = one_of("interval", "nodes", "mesh", "surface")
 
 
 class Boundary(Record):
@@ -81,10 +75,10 @@ class Boundary(Record):
     slope: Formula | None = None
     bounds: str | None = None
 
+    _check_form = one_of("on", "bounds")
+
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.on is None) == (self.bounds is None):
-            raise ValueError('exactly one of "on" and "bounds"')
         if self.bounds is not None and (self.where, self.value, self.slope) != (None, None, None):
             raise ValueError('"bounds" alone: its file says where and what')
         if self.on is not None and (self.value is None) == (self.slope is None):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fem_reference import metrics, solvers
+from fem_reference import effects, metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
 from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.foundations.errors import InputError, MissingSoftware
@@ -71,7 +71,7 @@ def is_material(effect: Effect) -> bool:
 
 def name_of(effect: Effect) -> str:
     """The name of an effect in scene files, and where it acts if it does so on a part of the surface only."""
-    name = type(effect).__module__.rpartition(".")[2]
+    name = effects.name_of(effect)
     return f"{name} on {effect.on}" if isinstance(effect, Load) else name
 
 

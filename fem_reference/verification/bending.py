@@ -1,8 +1,8 @@
 """Bodies that are bent and twisted: a block into a sector of a tube, a cylinder by a finite angle, a square bar by a small one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,35 +26,24 @@ RADIUS, TALL, TWIST = 10.0, 10.0, 0.05
 # Side and length of the square bar [mm], and its twist [rad/mm]: a shear of 0.0007 at its edges.
 SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
 
-Reading = Callable[[Floats, Frame], float]
+
+def flexed(thickness: float, length: float, angle: float, points: Floats, frame: float) -> Floats:
+    """The displacement (n, 3) [mm] of rest points (n, 3) of a block of ``thickness`` from x = 0 and of ``length`` [mm] about y = 0,
+    bent by ``angle`` [rad] times the frame number.
+    """
+    centred = points - [thickness / 2, 0.0, 0.0]
+    moves: Floats = rivlin.Flexure(1.0, thickness, length, angle * frame).positions(centred) - centred
+    return moves
 
 
-@dataclass(frozen=True)
-class Flexed:
-    """A block of ``thickness`` from x = 0 and of ``length`` [mm] about y = 0, bent by ``angle`` [rad] times the frame number."""
-
-    thickness: float
-    length: float
-    angle: float
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        block = rivlin.Flexure(1.0, self.thickness, self.length, self.angle * frame)
-        centred = points - [self.thickness / 2, 0.0, 0.0]
-        moves: Floats = block.positions(centred) - centred
-        return moves
-
-
-def bent(
-    lab: Lab, n: int, reading: str, element: str = "Q2/Q1", mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")
-) -> float:
+def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
     """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in their planes; ``mu``
     [MPa].
     """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
-    end = Prescribed("y1", "y1", (0, 1, 2), Flexed(THICKNESS, LENGTH, ANGLE))
+    end = Prescribed("y1", "y1", (0, 1, 2), partial(flexed, THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
-    return READINGS[reading](mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last)
+    return READINGS[reading].read(mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last)
 
 
 def circle(points: Floats) -> float:
@@ -68,12 +57,31 @@ def circle(points: Floats) -> float:
     return float(np.sqrt(c + a**2 + b**2))
 
 
-# Readings of nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
-# to the nodes of the inner face [mm], and the distance between the curved faces, halfway between the ends [mm].
-READINGS: dict[str, Reading] = {
-    "moment": lambda _, state: float(state.moments["y1"][2] / WIDTH),
-    "inner radius": lambda rest, state: circle(state.points[rest[:, 0] == 0, :2]),
-    "thickness": lambda rest, state: float(np.ptp(state.points[rest[:, 1] == 0, 0])),
+class Reading(NamedTuple):
+    """A quantity in words, its ``unit``, the reading of it from nodes at rest (n, 3) [mm] and the state, and its truth."""
+
+    words: str
+    unit: str
+    read: Callable[[Floats, Frame], float]
+    truth: Callable[[], float]
+
+
+TRUE = rivlin.Flexure(MU, THICKNESS, LENGTH, ANGLE)
+# The moment on the end per width; the circle nearest to the nodes of the inner face; the distance between the curved faces.
+READINGS = {
+    "moment": Reading("the moment", "N", lambda _, state: float(state.moments["y1"][2] / WIDTH), TRUE.moment),
+    "inner radius": Reading(
+        "the radius of its inner face",
+        "mm",
+        lambda rest, state: circle(state.points[rest[:, 0] == 0, :2]),
+        lambda: TRUE.radii()[0],
+    ),
+    "thickness": Reading(
+        "how thick it is halfway between its ends",
+        "mm",
+        lambda rest, state: float(np.ptp(state.points[rest[:, 1] == 0, 0])),
+        lambda: np.diff(TRUE.radii())[0],
+    ),
 }
 
 
@@ -101,28 +109,75 @@ def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> f
     return float(4 * lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["z1"][2] / SMALL_TWIST)
 
 
-TRUE = rivlin.Flexure(MU, THICKNESS, LENGTH, ANGLE)
-BLOCK = partial(
-    Entry,
-    group="flexure",
-    measure=bent,
-    relative=True,
-    kind="closed form",
-    source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
-    refinement=Refinement((1, 2, 3), THICKNESS / 2, order=4),
-)
+CELLS = {"P2/P1": ("tetrahedra", (1, 2, 4)), "Q2/Q1": ("hexahedra", (1, 2, 3))}  # by element, with counts of them
 FREE = control("one lateral face is free, so that the block may change its width", faces=("z0",))
+STIFF = control("the shear modulus is 1 % too large", mu=1.01 * MU)
+MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="the error changes its sign between meshes: no order")
 
-TWISTED, TWISTED_MOONEY_RIVLIN = (rivlin.Torsion(*moduli, RADIUS, TWIST) for moduli in ((MU / 2, 0.0), (C1, C2)))
+
+def flexure(
+    name: str, reading: str, element: str, wrong: dict[str, Any], error: tuple[float, str], **more: Any
+) -> Entry:
+    """A ``reading`` of the bent block; ``error``: the tolerance, and what the finest cells leave."""
+    cells, counts = CELLS[element]
+    stated: dict[str, Any] = {"refinement": Refinement(counts, THICKNESS / 2, order=4)} | wrong | more
+    return Entry(
+        name=f"flexure_{name}",
+        group="flexure",
+        title=f"Bending a block, half as thick as long, by one radian: {READINGS[reading].words}, by {cells} ({element})",
+        unit=READINGS[reading].unit,
+        measure=bent,
+        given={"reading": reading, "element": element},
+        truth=READINGS[reading].truth,
+        within=error[0],
+        relative=True,
+        because=f"discretisation {error[1]} cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
+        kind="closed form",
+        source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
+        **stated,
+    )
+
+
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
-CYLINDER = partial(
-    Entry,
-    group="torsion",
-    measure=twisted,
-    relative=True,
-    kind="closed form",
-    source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
-)
+TWISTED = {
+    "neo-Hookean": (NEO_HOOKE, rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST)),
+    "Mooney-Rivlin": (MOONEY_RIVLIN, rivlin.Torsion(C1, C2, RADIUS, TWIST)),
+}
+MOMENT = ("moments", "the moment", "N mm", "moment")
+PULL = ("forces", "the force that keeps it from growing longer (Poynting effect)", "N", "axial_force")
+STRAIGHT = control("straight cells, whose surface has flat facets", degree=1)
+SAME_MOMENT = "material of the same shear modulus, which turns with the same moment"
+MOONEY = control(f"Mooney-Rivlin {SAME_MOMENT}", material=MOONEY_RIVLIN)
+NEO = control(f"neo-Hookean {SAME_MOMENT}", material=NEO_HOOKE)
+OTHER_C2 = control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, BULK))
+
+
+def torsion(
+    name: str, law: str, read: tuple[str, ...], wrong: dict[str, Any], error: tuple[float, str], **given: Any
+) -> Entry:
+    """A quantity ``read`` of the twisted cylinder, on a ladder of cells unless the number of ``rings`` is given."""
+    end, words, unit, truth = read
+    material, true = TWISTED[law]
+    cells, counts = CELLS[given["element"]]
+    ladder = {} if "rings" in given else {"refinement": Refinement(counts, RADIUS / 2, order=4), **SLOW}
+    return Entry(
+        name=f"torsion_{name}",
+        group="torsion",
+        title=f"Twisting a {law} cylinder by half a radian: {words}, by curved {cells} ({given['element']})",
+        unit=unit,
+        measure=twisted,
+        given={"end": end, "material": material, **given},
+        truth=getattr(true, truth),
+        within=error[0],
+        relative=True,
+        because=f"discretisation of order 4, {error[1]} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
+        kind="closed form",
+        source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
+        **wrong,
+        **ladder,
+    )
+
+
 SQUARE = partial(
     Entry,
     group="torsion",
@@ -137,102 +192,15 @@ SQUARE = partial(
 )
 
 ENTRIES: tuple[Entry, ...] = (
-    BLOCK(
-        name="flexure_moment_tetrahedra",
-        title="Bending a block, half as thick as long, by one radian: the moment, by tetrahedra (P2/P1)",
-        unit="N",
-        given={"reading": "moment", "element": "P2/P1"},
-        **FREE,
-        truth=TRUE.moment,
-        within=5e-5,
-        because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
-        refinement=Refinement((1, 2, 4), THICKNESS / 2, order=4),
-    ),
-    BLOCK(
-        name="flexure_moment_hexahedra",
-        title="Bending a block, half as thick as long, by one radian: the moment, by hexahedra (Q2/Q1)",
-        unit="N",
-        given={"reading": "moment"},
-        **control("the shear modulus is 1 % too large", mu=1.01 * MU),
-        truth=TRUE.moment,
-        within=1e-5,
-        because="discretisation of order 4, 3e-6 with 6 cells through the thickness; K/mu of 1e6 adds 1e-6",
-    ),
-    BLOCK(
-        name="flexure_inner_radius",
-        title="Bending a block, half as thick as long, by one radian: the radius of its inner face",
-        unit="mm",
-        given={"reading": "inner radius"},
-        **FREE,
-        truth=lambda: TRUE.radii()[0],
-        within=1e-4,
-        because="discretisation, 3e-5 with 6 cells through the thickness (Q2/Q1)",
-        refinement=Refinement(
-            (1, 2, 3), THICKNESS / 2, order=None, note="the error changes its sign between meshes: no order"
-        ),
-    ),
-    BLOCK(
-        name="flexure_thickness",
-        title="Bending a block, half as thick as long, by one radian: how thick it is halfway between its ends",
-        unit="mm",
-        given={"reading": "thickness"},
-        **FREE,
-        truth=lambda: np.diff(TRUE.radii())[0],
-        within=3e-5,
-        because="discretisation of order 4 or more, 7e-6 with 6 cells through the thickness (Q2/Q1)",
-    ),
-    *(
-        CYLINDER(
-            name=f"torsion_moment_{cells}",
-            title=f"Twisting a cylinder by half a radian: the moment, by curved {cells} ({element})",
-            unit="N mm",
-            given={"end": "moments", "element": element, "material": NEO_HOOKE},
-            **control("straight cells, whose surface has flat facets", degree=1),
-            truth=TWISTED.moment,
-            within=within,
-            because=f"discretisation of order 4, {left} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
-            refinement=Refinement(counts, RADIUS / 2, order=4),
-            **SLOW,
-        )
-        for cells, element, within, left, counts in (
-            ("tetrahedra", "P2/P1", 5e-4, "8e-5 with 8", (1, 2, 4)),
-            ("hexahedra", "Q2/Q1", 1e-4, "1.6e-5 with 6", (1, 2, 3)),
-        )
-    ),
-    CYLINDER(
-        name="torsion_axial_force",
-        title="Twisting a cylinder by half a radian: the force that keeps it from growing longer (Poynting effect)",
-        unit="N",
-        given={"end": "forces", "element": "Q2/Q1", "material": NEO_HOOKE},
-        negative_control="Mooney-Rivlin material of the same shear modulus, which turns with the same moment",
-        wrong={"material": MOONEY_RIVLIN},
-        truth=TWISTED.axial_force,
-        within=1e-3,
-        because="discretisation of order 4, 1.7e-4 with 6 cells along the radius: a force of second order in the twist",
-        refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
-        **SLOW,
-    ),
-    CYLINDER(
-        name="torsion_moment_mooney_rivlin",
-        title="Twisting a Mooney-Rivlin cylinder by half a radian: the moment",
-        unit="N mm",
-        given={"end": "moments", "rings": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        **control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, BULK)),
-        truth=TWISTED_MOONEY_RIVLIN.moment,
-        within=5e-4,
-        because="discretisation of order 4, 8e-5 with 4 cells along the radius (Q2/Q1)",
-    ),
-    CYLINDER(
-        name="torsion_axial_force_mooney_rivlin",
-        title="Twisting a Mooney-Rivlin cylinder by half a radian: the force that keeps it from growing longer",
-        unit="N",
-        given={"end": "forces", "rings": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        negative_control="neo-Hookean material of the same shear modulus, which turns with the same moment",
-        wrong={"material": NEO_HOOKE},
-        truth=TWISTED_MOONEY_RIVLIN.axial_force,
-        within=2e-3,
-        because="discretisation of order 4, 4e-4 with 4 cells along the radius (Q2/Q1)",
-    ),
+    flexure("moment_tetrahedra", "moment", "P2/P1", FREE, (5e-5, "of order 4, 1e-5 with 8")),
+    flexure("moment_hexahedra", "moment", "Q2/Q1", STIFF, (1e-5, "of order 4, 3e-6 with 6")),
+    flexure("inner_radius", "inner radius", "Q2/Q1", FREE, (1e-4, "that leaves 3e-5 with 6"), refinement=MIXED),
+    flexure("thickness", "thickness", "Q2/Q1", FREE, (3e-5, "of order 4 or more, 7e-6 with 6")),
+    torsion("moment_tetrahedra", "neo-Hookean", MOMENT, STRAIGHT, (5e-4, "8e-5 with 8"), element="P2/P1"),
+    torsion("moment_hexahedra", "neo-Hookean", MOMENT, STRAIGHT, (1e-4, "1.6e-5 with 6"), element="Q2/Q1"),
+    torsion("axial_force", "neo-Hookean", PULL, MOONEY, (1e-3, "1.7e-4 with 6"), element="Q2/Q1"),
+    torsion("moment_mooney_rivlin", "Mooney-Rivlin", MOMENT, OTHER_C2, (5e-4, "8e-5 with 4"), element="Q2/Q1", rings=2),
+    torsion("axial_force_mooney_rivlin", "Mooney-Rivlin", PULL, NEO, (2e-3, "4e-4 with 4"), element="Q2/Q1", rings=2),
     *(
         SQUARE(
             name=f"torsion_square_bar_{cells}",

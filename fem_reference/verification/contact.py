@@ -1,16 +1,14 @@
 """Contact of bodies with rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 from scipy.optimize import brentq
-from scipy.spatial.transform import Rotation
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
-from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
+from fem_reference.foundations.motion import Translation
+from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import ContactBone, ContactLaw
@@ -23,29 +21,16 @@ RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0  # of the ball [mm], and of the body [M
 BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, and its finest part [mm]
 
 
-@dataclass(frozen=True)
-class Slide:
-    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``path`` [mm] from
-    frame 0 to frame 1.
-    """
-
-    path: Vector
-    start: Vector = (0.0, 0.0, 0.0)
-    turned: Vector = (0.0, 0.0, 0.0)
-
-    def __call__(self, frame: float) -> Floats:
-        """Its pose, 4 x 4."""
-        pose = np.eye(4)
-        pose[:3, :3] = Rotation.from_rotvec(self.turned).as_matrix()
-        pose[:3, 3] = np.array(self.start) + np.array(self.path) * frame
-        return pose
+def sliding_by(path: float) -> Callable[[float], Floats]:
+    """The pose, 4 x 4, of what slides along z by a ``path`` [mm] from frame 0 to frame 1."""
+    return Translation((0.0, 0.0, 1.0), (0.0, 1.0), (0.0, path)).pose
 
 
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     """The force [N] of a smooth plate that is moved down on an eighth of a cube of 2 mm."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = ContactLaw("z1", stiffness, 0.01)
-    above = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_TRAVEL)))
+    above = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), sliding_by(-PLATE_TRAVEL))
     body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, bones=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
@@ -65,7 +50,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
     """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = ContactLaw("z0", BALL_STIFFNESS, 5e-4)
-    ball = ContactBone("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
+    ball = ContactBone("ball", Sphere((0.0, 0.0, -radius), radius), sliding_by(APPROACH))
     body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *clamped("outer")), (0.0, 1.0), contact=law, bones=(ball,))
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 

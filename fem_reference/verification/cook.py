@@ -72,109 +72,69 @@ def ratio(lab: Lab, n: int, **panel: Any) -> float:
 
 COMPRESSIBLE = {"name": "COMPRESSIBLE", "share": SMALL}
 NEARLY = {"name": "NEARLY_INCOMPRESSIBLE", "share": SMALL}
+QUARTER, FULL = {"name": "FINITE_QUARTER"}, {"name": "FINITE"}
+MEMBRANES = {
+    "COMPRESSIBLE": "at small strain, Poisson's ratio 1/3",
+    "NEARLY_INCOMPRESSIBLE": "at small strain, Poisson's ratio 0.4999",
+    "FINITE_QUARTER": "at finite strain, a quarter of the load",
+    "FINITE": "at finite strain, the whole load",
+}
+# By element: the cells in words, and the counts of them. Towards the singular clamped corners the error of quadratic cells falls at
+# order 1 or more; that of linear ones, which are far from it, at 2.
+CELLS = {
+    "P1": ("linear tetrahedra", (16, 32, 64)),
+    "P1/P1": ("linear tetrahedra with a linear pressure that is stabilised", (8, 16, 32)),
+    "Q1/P0": ("linear hexahedra with a constant pressure", (8, 16, 32)),
+    "P2": ("quadratic tetrahedra", (4, 8, 16)),
+    "P2/P1": ("quadratic tetrahedra with a pressure", (4, 8, 16)),
+    "Q2/Q1": ("quadratic hexahedra with a linear pressure", (4, 8, 16)),
+}
 SOURCE = "validation/cook.py: finite elements of degree 6 to 10 of our own in numpy, on graded grids; Cook 1974"
 MEMBRANE = partial(Entry, group="Cook's membrane", kind="second solver", source=SOURCE)
-# The clamped corners are singular: the error falls at order 1 or more.
-TIP = partial(MEMBRANE, unit="mm", measure=tip, relative=True, refinement=Refinement((4, 8, 16), HEIGHT, order=1))
 LINEAR = control("linear tetrahedra without a pressure", element="P1")
+LINEAR_HEXAHEDRA = control("linear hexahedra without a pressure", element="Q1")
 SOFTER = control(
     "Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus", shear=1.4**-1 * 4 / 3, bulk=5 / 3
 )
+LOCKING = control("Poisson's ratio is 0.4999, at the same Young's modulus: it locks", **NEARLY)
 STIFF = control("the shear modulus is 2 % too high", shear=1.02)
 SMALL_STRAIN = control("small strain, by linear extrapolation of a tiny load", share=SMALL)
 
+
+def tip_entry(
+    name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
+) -> Entry:
+    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and by how much it is too stiff."""
+    words, counts = CELLS[element]
+    by, order = ("by linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
+    stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
+    return MEMBRANE(
+        name=f"cook_{name}",
+        title=f"Cook's membrane {MEMBRANES[panel['name']]}: tip by {words}",
+        unit="mm",
+        measure=tip,
+        given={**panel, "element": element},
+        truth=getattr(cook, panel["name"]).tip,
+        within=stiff[0],
+        relative=True,
+        because=f"discretisation, {by}, too stiff by {stiff[1]}",
+        **stated,
+    )
+
+
+SHORT = Refinement((4, 8), HEIGHT, order=1)
+LEFT_OPEN = "0.06 %; a clamped corner folds on fine meshes, so that 0.02 % of the truth are open"
+
 ENTRIES: tuple[Entry, ...] = (
-    TIP(
-        name="cook_compressible",
-        title="Cook's membrane at small strain, Poisson's ratio 1/3: tip by quadratic tetrahedra",
-        given={**COMPRESSIBLE, "element": "P2"},
-        **SOFTER,
-        truth=cook.COMPRESSIBLE.tip,
-        within=0.005,
-        because="discretisation, limited by the singular clamped corners: 0.15 % too stiff",
-    ),
-    TIP(
-        name="cook_compressible_linear",
-        title="The same by linear tetrahedra, which come slowly but surely where nothing is incompressible",
-        given={**COMPRESSIBLE, "element": "P1"},
-        negative_control="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
-        wrong=NEARLY,
-        truth=cook.COMPRESSIBLE.tip,
-        within=0.04,
-        because="discretisation by linear cells",
-        refinement=Refinement((16, 32, 64), HEIGHT, order=2),
-        slow=True,
-    ),
-    TIP(
-        name="cook_nearly_incompressible",
-        title="Cook's membrane at small strain, Poisson's ratio 0.4999: tip by quadratic tetrahedra with a pressure",
-        given={**NEARLY, "element": "P2/P1"},
-        **LINEAR,
-        truth=cook.NEARLY_INCOMPRESSIBLE.tip,
-        within=0.005,
-        because="discretisation, limited by the singular clamped corners: 0.16 % too stiff",
-    ),
-    TIP(
-        name="cook_hexahedra",
-        title="The same by quadratic hexahedra with a linear pressure",
-        given={**NEARLY, "element": "Q2/Q1"},
-        **STIFF,
-        truth=cook.NEARLY_INCOMPRESSIBLE.tip,
-        within=0.001,
-        because="discretisation: 0.02 % too stiff",
-        slow=True,
-    ),
-    TIP(
-        name="cook_constant_pressure",
-        title="The same by linear hexahedra with a constant pressure",
-        given={**NEARLY, "element": "Q1/P0"},
-        **control("linear hexahedra without a pressure", element="Q1"),
-        truth=cook.NEARLY_INCOMPRESSIBLE.tip,
-        within=0.015,
-        because="discretisation by linear cells: 0.5 % too stiff",
-        refinement=Refinement((8, 16, 32), HEIGHT, order=2),
-    ),
-    TIP(
-        name="cook_stabilised",
-        title="The same by linear tetrahedra with a linear pressure that is stabilised",
-        given={**NEARLY, "element": "P1/P1"},
-        **LINEAR,
-        truth=cook.NEARLY_INCOMPRESSIBLE.tip,
-        within=0.04,
-        because="discretisation by linear cells: 22, 7.7 and 2.2 % too stiff in 8, 16 and 32 cells a side",
-        refinement=Refinement((8, 16, 32), HEIGHT, order=2),
-    ),
-    TIP(
-        name="cook_quarter_load",
-        title="Cook's membrane at finite strain, a quarter of the load: tip by quadratic tetrahedra with a pressure",
-        given={"name": "FINITE_QUARTER", "element": "P2/P1"},
-        **SMALL_STRAIN,
-        truth=cook.FINITE_QUARTER.tip,
-        within=0.005,
-        because="discretisation, limited by the singular clamped corners: 0.17 % too stiff",
-        slow=True,
-    ),
-    TIP(
-        name="cook_quarter_load_hexahedra",
-        title="The same by quadratic hexahedra with a linear pressure",
-        given={"name": "FINITE_QUARTER", "element": "Q2/Q1"},
-        **STIFF,
-        truth=cook.FINITE_QUARTER.tip,
-        within=0.001,
-        because="discretisation: 0.02 % too stiff",
-        **SLOW,
-    ),
-    TIP(
-        name="cook_full_load",
-        title="Cook's membrane at finite strain, the whole load: tip by quadratic hexahedra with a linear pressure",
-        given={"name": "FINITE", "element": "Q2/Q1"},
-        **SMALL_STRAIN,
-        truth=cook.FINITE.tip,
-        within=0.002,
-        because="discretisation (0.06 % too stiff) and 0.02 % that the truth leaves open: a clamped corner folds on fine meshes",
-        refinement=Refinement((4, 8), HEIGHT, order=1),
-        slow=True,
-    ),
+    tip_entry("compressible", COMPRESSIBLE, "P2", SOFTER, (0.005, "0.15 %")),
+    tip_entry("compressible_linear", COMPRESSIBLE, "P1", LOCKING, (0.04, "1.3 %"), slow=True),
+    tip_entry("nearly_incompressible", NEARLY, "P2/P1", LINEAR, (0.005, "0.16 %")),
+    tip_entry("hexahedra", NEARLY, "Q2/Q1", STIFF, (0.001, "0.02 %"), slow=True),
+    tip_entry("constant_pressure", NEARLY, "Q1/P0", LINEAR_HEXAHEDRA, (0.015, "0.5 %")),
+    tip_entry("stabilised", NEARLY, "P1/P1", LINEAR, (0.04, "22, 7.7 and 2.2 % in 8, 16 and 32 cells a side")),
+    tip_entry("quarter_load", QUARTER, "P2/P1", SMALL_STRAIN, (0.005, "0.17 %"), slow=True),
+    tip_entry("quarter_load_hexahedra", QUARTER, "Q2/Q1", STIFF, (0.001, "0.02 %"), **SLOW),
+    tip_entry("full_load", FULL, "Q2/Q1", SMALL_STRAIN, (0.002, LEFT_OPEN), slow=True, refinement=SHORT),
     MEMBRANE(
         name="cook_p1_locks",
         title="Linear tetrahedra lock at Poisson's ratio 0.4999: tip over where it should be, less than a half",

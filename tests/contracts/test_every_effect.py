@@ -135,7 +135,7 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
             "holzapfel_ogden",
             "normal",
             [0, 1e10, 0],
-            "want a normal that is not zero, with a largest entry from 1e-9 to 1e9",
+            "want a normal that is not zero, with a length from 1e-9 to 1e9",
         ),
         ("guccione", "bf", 0.0, "bf: got 0.0, want greater than 0"),
         ("guccione", "bt", 0.0, "bt: got 0.0, want greater than 0"),

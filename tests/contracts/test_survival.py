@@ -152,7 +152,7 @@ def test_a_state_with_damaged_facts_is_not_gone_on_from(facts: str, tmp_path: Pa
     assert not jobs._is_of(whole, 10)
 
 
-@pytest.mark.parametrize("name", ["a.vtp", "a.vtk", "a.vtu", "a.ply", "a.msh", "a.stl"])
+@pytest.mark.parametrize("name", ["a.vtp", "a.vtk", "a.vtu", "a.ply"])
 def test_what_was_there_stays_where_there_is_no_room(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

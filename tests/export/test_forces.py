@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.export import forces
 from fem_reference.foundations.motion import Rotation
-from fem_reference.io import files
+from fem_reference.io.formats import vtk
 from fem_reference.metrics import Measure
 from fem_reference.problems.setup import AttachedVertices, Joint, Setup
 from fem_reference.runs.contents import vector_scalars
@@ -97,7 +97,7 @@ def test_points_with_vectors_for_paraview(compared: Comparison, tmp_path) -> Non
     assert forces.block(compared.reference, compared.setup, 0) is None  # no force at rest
     found = forces.block(compared.reference, compared.setup, 2)
     assert found is not None
-    files.write_blocks(tmp_path / "frame.vtm", {"forces": found})
+    vtk.write_blocks(tmp_path / "frame.vtm", {"forces": found})
     read = pyvista.read(tmp_path / "frame.vtm")["forces"]
     assert_allclose(read.point_data["force"], PULL[[2]])
     assert_allclose(read.points, found.points)

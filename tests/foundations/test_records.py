@@ -8,7 +8,7 @@ import pytest
 from pydantic import Field
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record, join, parse
+from fem_reference.foundations.records import Record, directed, increasing, join, one_of, parse
 
 
 class Leaf(Record):
@@ -94,3 +94,31 @@ def test_bad_input_is_the_same_in_another_process() -> None:
     error = InputError("case.toml: bone", None, "a bone")
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.place, again.want) == (str(error), "case.toml: bone", "a bone")
+
+
+class Choice(Record):
+    """A record with two keys of which one is wanted."""
+
+    one: int | None = None
+    other: int | None = None
+
+    _check = one_of("one", "other")
+
+
+def test_exactly_one_of_some_keys_is_given() -> None:
+    assert parse(Choice, {"one": 0}, "a.toml").one == 0
+    for table in ({}, {"one": 1, "other": 2}):
+        with pytest.raises(InputError, match='exactly one of "one" and "other"'):
+            parse(Choice, table, "a.toml")
+
+
+def test_what_increases_and_what_points_somewhere() -> None:
+    assert increasing((1, 2, 3), "more") == (1, 2, 3)
+    assert increasing(None, "more") is None
+    assert directed((0.0, 0.0, -2.0), "an axis") == (0.0, 0.0, -2.0)
+    for values in ((1, 1), (2, 1), (1, 3, 2)):
+        with pytest.raises(ValueError, match="more"):
+            increasing(values, "more")
+    for vector in ((0.0, 0.0, 0.0), (0.0, 1e10, 0.0), (math.nan, 0.0, 1.0)):
+        with pytest.raises(ValueError, match="an axis that is not zero"):
+            directed(vector, "an axis")

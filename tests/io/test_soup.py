@@ -37,12 +37,6 @@ def test_lines_go_on_where_another_ends() -> None:
         soup.joined([[0, 1], [1, 0]])
 
 
-def test_a_displacement_has_the_shape_of_the_points() -> None:
-    assert soup.displacement({"u": POINTS, "displacement": POINTS[:2]}, POINTS) is POINTS
-    with pytest.raises(ValueError, match="point data v in a step"):
-        soup.displacement({"v": POINTS}, POINTS)
-
-
 def test_rows_bring_the_same_floats_back() -> None:
     wanted = np.array([[1 / 3, 1e-320, -0.0], [1e300, 0.1, 7]])
     assert np.array_equal([[float(word) for word in row.split()] for row in soup.rows(wanted)], wanted)

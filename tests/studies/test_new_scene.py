@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapes
 
 from fem_reference import cli
 from fem_reference.foundations.errors import InputError
@@ -23,7 +24,7 @@ def stl(tmp_path: Path) -> Path:
     """The muscle and bones of hip_flexion as somebody's STL files, in metres."""
     for name in ("muscle", "pelvis", "femur"):
         surface = files.read_surface(HIP / f"{name}.ply", 1.0)
-        files.write_surface(tmp_path / f"my_{name}.stl", surface, surface.points / 1000)
+        shapes.write(tmp_path / f"my_{name}.stl", surface, surface.points / 1000)
     return tmp_path
 
 

@@ -32,7 +32,7 @@ def bodies(folder: Path, units: dict[str, float] | None = None, suffix: str = ".
         surface = shapes.skin(shapes.box((3, 3, 8), size))
         found[name] = folder / f"{name}{suffix}"
         moved = (surface.points + PLACES[name]) / (units or {}).get(name, 1.0)
-        files.write_surface(found[name], surface, moved)
+        shapes.write(found[name], surface, moved)
     return found
 
 
@@ -116,7 +116,7 @@ def test_surfaces_that_are_apart_are_refused(tmp_path: Path, capsys) -> None:
     # As long as a muscle and bones in mm, but the muscle was scaled about another origin: its boxes are far from theirs.
     given = bodies(tmp_path)
     surface = shapes.skin(shapes.box((3, 3, 8), MUSCLE))
-    files.write_surface(given["muscle"], surface, surface.points + [0, 0, 2000])
+    shapes.write(given["muscle"], surface, surface.points + [0, 0, 2000])
     for more in ((), ("--unit", "mm")):
         assert made(tmp_path, given, *more) == cli.BAD_INPUT
         assert re.search(r"muscle.stl: got .*1.76e\+03 mm from it, .* want .*--unit", capsys.readouterr().err)

@@ -1,7 +1,7 @@
 """Formats of surface meshes: one file each, found by their folder.
 
-A file has one ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface comes back bit by bit, and a file that was
-cut off is refused.
+A file has one ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written comes back bit by bit, and a
+file that was cut off is refused.
 """
 
 import importlib
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from fem_reference.foundations.mesh import Floats, Polylines, Surface
-from fem_reference.io.soup import Lines, Soup
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.io.soup import Soup
 
 
 @dataclass(frozen=True)
@@ -20,18 +20,14 @@ class Format:
     """A mesh format, known by the ``suffixes`` of its files, lower case, with their dots.
 
     ``read``: points and triangles as in the file; raises whatever it likes where the file is not whole. ``write``: the surface
-    as it is, with its displacement (n, 3) [mm] where the format has room for it. ``read_lines`` and ``write_lines``, for the
-    suffixes in ``lines``: the same of polylines. ``shares_points``: whether triangles have points in common, in their order;
-    else each has three of its own. ``states_size``: whether a file says how much of it there is; else a cut between two of its
-    lines is not seen.
+    as it is, with its displacement (n, 3) [mm] where the format has room for it; None where the format is only read.
+    ``shares_points``: whether triangles have points in common, in their order; else each has three of its own.
+    ``states_size``: whether a file says how much of it there is; else a cut between two of its lines is not seen.
     """
 
     suffixes: tuple[str, ...]
     read: Callable[[Path], Soup]
-    write: Callable[[Path, Surface, Floats], None]
-    read_lines: Callable[[Path], Lines] | None = None
-    write_lines: Callable[[Path, Polylines, Floats], None] | None = None
-    lines: tuple[str, ...] = ()
+    write: Callable[[Path, Surface, Floats], None] | None = None
     shares_points: bool = True
     states_size: bool = True
 

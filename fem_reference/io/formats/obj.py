@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.io.formats import Format
-from fem_reference.io.soup import Soup, only_triangles, positions, rows
+from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
@@ -22,11 +21,4 @@ def _read(path: Path) -> Soup:
     return positions(points), triangles
 
 
-def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
-    """OBJ, coordinates in full."""
-    points = (f"v {row}" for row in rows(surface.points))
-    faces = (f"f {a} {b} {c}" for a, b, c in (surface.triangles + 1).tolist())
-    path.write_text("\n".join([*points, *faces, ""]), encoding="utf-8")
-
-
-FORMAT = Format((".obj",), _read, _write, states_size=False)
+FORMAT = Format((".obj",), _read, states_size=False)

@@ -3,9 +3,8 @@
 import re
 from pathlib import Path
 
-from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.io.formats import Format
-from fem_reference.io.soup import Soup, only_triangles, positions, rows
+from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
@@ -23,11 +22,4 @@ def _read(path: Path) -> Soup:
     return points, [[int(value) for value in row[1:4]] for row in rows[vertices:]]
 
 
-def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
-    """OFF, coordinates in full."""
-    faces = (f"3 {a} {b} {c}" for a, b, c in surface.triangles.tolist())
-    head = ["OFF", f"{len(surface.points)} {len(surface.triangles)} 0"]
-    path.write_text("\n".join([*head, *rows(surface.points), *faces, ""]), encoding="utf-8")
-
-
-FORMAT = Format((".off",), _read, _write)
+FORMAT = Format((".off",), _read)

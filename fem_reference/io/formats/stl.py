@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.io.formats import Format
-from fem_reference.io.soup import Soup, rows
+from fem_reference.io.soup import Soup
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -26,11 +25,4 @@ def _read(path: Path) -> Soup:
     return points, np.arange(len(points)).reshape(-1, 3)
 
 
-def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
-    """STL as text, coordinates in full; without normals, which the order of the corners says too."""
-    around = ("facet normal 0 0 0\nouter loop\nvertex ", "\nvertex ", "\nendloop\nendfacet\n")
-    facets = (around[0] + around[1].join(rows(corners)) + around[2] for corners in surface.points[surface.triangles])
-    path.write_text(f"solid surface\n{''.join(facets)}endsolid surface\n", encoding="utf-8")
-
-
-FORMAT = Format((".stl",), _read, _write, shares_points=False)
+FORMAT = Format((".stl",), _read, shares_points=False)

@@ -11,10 +11,11 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
-from fem_reference.io.soup import DataSet, Lines, Soup, check_lines, joined, only_triangles
+from fem_reference.io.soup import DataSet, Lines, Soup, joined, only_triangles
 
 _TRIANGLE = 5  # of VTK's cell types
 _NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
+LINES = (".vtk", ".vtp")  # the formats that have polylines
 _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}
 
 
@@ -48,16 +49,17 @@ def _read(path: Path) -> Soup:
     return data.points, cells.corners.reshape(-1, 3)
 
 
-def _read_lines(path: Path) -> Lines:
+def read_lines(path: Path) -> Lines:
     """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
     data = _data(path)
     found = data.cells.get("Lines")
     if data.kind != "PolyData" or found is None or len(found.corners) == 0:
         raise ValueError("no lines")
     cells = [cell.tolist() for cell in np.split(found.corners, np.cumsum(found.sizes)[:-1])]
-    points = np.asarray(data.points, np.float64)
-    check_lines(points, cells)
-    return points, joined(cells)
+    for number, cell in enumerate(cells):
+        if len(cell) < 2:
+            raise ValueError(f"line {number} of {len(cell)} points")
+    return np.asarray(data.points, np.float64), joined(cells)
 
 
 def read_points(path: Path) -> Any:
@@ -76,7 +78,7 @@ def _write(path: Path, surface: Surface, displacement: Floats) -> None:
     _save(path, surface.points, surface.triangles, displacement)
 
 
-def _write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
+def write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
     """The lines with point data ``displacement`` [mm], float64."""
     _save(path, lines.points, lines, displacement)
 
@@ -110,7 +112,7 @@ def _finish(kind: str, path: Path, data: Any) -> None:
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """VTM of ``blocks`` by name, with their own files in a folder beside it of the same name; OSError where that fails."""
+    """VTM of ``blocks`` by name, with their files in a folder beside it, so not whole or not at all; OSError where that fails."""
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 
@@ -142,4 +144,4 @@ def _data_set(block: DataBlock) -> Any:
     return data
 
 
-FORMAT = Format((".vtk", ".vtp", ".vtu"), _read, _write, _read_lines, _write_lines, lines=(".vtk", ".vtp"))
+FORMAT = Format((".vtk", ".vtp", ".vtu"), _read, _write)

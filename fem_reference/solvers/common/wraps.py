@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, model_validator
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.records import Record, join, one_of
 from fem_reference.foundations.units import Point, PositiveLength, three
 from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
@@ -59,16 +59,12 @@ class ObstacleOn(Record):
     ellipsoid: Ellipsoid | None = None
     torus: Torus | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if len(self.model_fields_set) != 2:
-            raise ValueError('one of "sphere", "cylinder", "ellipsoid", "torus"')
-        return self
+    _check = one_of("sphere", "cylinder", "ellipsoid", "torus")
 
     @property
     def name(self) -> str:
         """The kind of shape, by which messages name it."""
-        return next(iter(self.model_fields_set - {"bone"}))
+        return next(key for key, given in self if key != "bone" and given is not None)
 
     def surface(self) -> Quadric | Ring:
         """Its surface at rest."""

@@ -13,6 +13,7 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
+from fem_reference.effects import name_of
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
@@ -122,7 +123,7 @@ class Validity:
     def _limits(self, measure: str, frame: float) -> list[tuple[str, Limit]]:
         """The limits on a measure by laws that act at a frame, by name of the law."""
         return [
-            (type(effect).__module__.rpartition(".")[2], limit)
+            (name_of(effect), limit)
             for effect in self.effects
             if effect.amount(frame) != 0
             for limit in effect.limits()

@@ -12,7 +12,7 @@ from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import FileName, Record, join, keys, parse
+from fem_reference.foundations.records import FileName, Record, join, keys, one_of, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
@@ -153,10 +153,10 @@ class Hard(Record):
             raise ValueError("bones of closed forms, and not of files")
         return bones
 
+    _check_form = one_of("block", "shipped")
+
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.block is None) == (self.shipped is None):
-            raise ValueError('exactly one of "block" and "shipped"')
         if (self.block is None) != (self.frames is None):
             raise ValueError('"frames" beside "block" and only there')
         if bool(self.only) != bool(self.because):

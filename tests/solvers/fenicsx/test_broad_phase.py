@@ -5,6 +5,8 @@ import pytest
 
 pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
 
+from slides import Slide
+
 from fem_reference.geometry.rigid_bodies import Obstacle, Sphere
 from fem_reference.geometry.signed_distance import build
 from fem_reference.geometry.tessellation import tessellated
@@ -12,7 +14,6 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.verification.contact import Slide
 from tests.solvers.fenicsx.test_contact_points import SMOOTHING, nodes_of
 
 

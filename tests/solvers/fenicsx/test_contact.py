@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from slides import Slide
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
@@ -11,7 +12,6 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Rest
 from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
-from fem_reference.verification.contact import Slide
 
 pytestmark = pytest.mark.slow
 

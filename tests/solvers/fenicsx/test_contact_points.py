@@ -7,12 +7,13 @@ import pytest
 
 pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
 
+from slides import Slide
+
 from fem_reference.geometry.rigid_bodies import Capsule
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.verification.contact import Slide
 
 # Around a capsule along z, beside it and at its ends, at gaps from below -SMOOTHING to above 0.
 SMOOTHING = 0.2

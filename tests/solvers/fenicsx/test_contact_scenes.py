@@ -5,6 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 import small
+from slides import Slide
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import apply
@@ -15,7 +16,6 @@ from fem_reference.problems.contact import ContactBone, ContactLaw, nearest_on_p
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.verification import parts
-from fem_reference.verification.contact import Slide
 
 pytestmark = pytest.mark.slow
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import small
 from acting import make
+from slides import Slide
 
 from fem_reference.effects import Effect
 from fem_reference.effects import make as made
@@ -20,7 +21,6 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.key import PACKAGE
 from fem_reference.solvers.fenicsx import BodySettings
-from fem_reference.verification.contact import Slide
 from tests.solvers.fenicsx.test_stability import flesh
 
 # The rule
