@@ -9,7 +9,6 @@ in every sweep, where line 13 finds them once.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -87,6 +86,11 @@ class PbdConstraints:
     hinges: Ints
     angles: Floats
 
+    @property
+    def count(self) -> int:
+        """The number of constraints."""
+        return len(self.edges) + len(self.hinges) + 1
+
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
         """The constraints of a closed surface whose vertices ``attached`` (k,) are attached; all edges are as stiff."""
@@ -133,28 +137,31 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
 
 def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+    return follow(timed(PbdSurface, setup, settings), setup, sink)
 
 
-def moving_surface(settings: PbdSettings, setup: Setup) -> MovingSurface:
-    """The surface of ``setup`` with its constraints."""
-    constraints = constraints_of(setup, settings)
-    bones = (
-        []
-        if settings.collision is None
-        else colliding_bones(setup.bones, setup.surface.points, setup.attached_vertices, settings.collision.gap)
-    )
+class PbdSurface(MovingSurface):
+    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and bones that it collides with."""
 
-    def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
-        carry(points, setup, frame)
-        for bone in bones:
-            bone.move(frame)
-        for _ in range(settings.sub_iterations):
-            points, displacement = advance(points, displacement, constraints, settings, bones)
-        return points, displacement
+    def __init__(self, setup: Setup, settings: PbdSettings) -> None:
+        super().__init__(setup)
+        self.settings, self.constraints = settings, constraints_of(setup, settings)
+        self.displacement, self.bones = np.zeros_like(self.points), list[CollidingBone]()
+        if settings.collision is not None:
+            places = setup.surface.points, setup.attached_vertices
+            self.bones = colliding_bones(setup.bones, *places, settings.collision.gap)
+        self.cost["projections"] = 0.0
 
-    each = len(constraints.edges) + len(constraints.hinges) + 1
-    return MovingSurface(setup, iterate, each * settings.solver_iterations * settings.sub_iterations)
+    def move(self, number: int) -> None:
+        """Run one iteration."""
+        carry(self.points, self.setup, number)
+        for bone in self.bones:
+            bone.move(number)
+        now, chosen = (self.points, self.displacement), self.settings
+        for _ in range(chosen.sub_iterations):
+            now = advance(*now, self.constraints, chosen, self.bones)
+        self.points, self.displacement = now
+        self.cost["projections"] += self.constraints.count * chosen.solver_iterations * chosen.sub_iterations
 
 
 def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:

@@ -34,7 +34,6 @@ the direction they have (there: it is taken from points read beside their own).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -184,29 +183,34 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
 
 def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+    return follow(timed(ProgramSurface, setup, settings), setup, sink)
 
 
-def moving_surface(settings: ProgramSettings, setup: Setup) -> MovingSurface:
-    """The surface of ``setup`` with its constraints."""
-    constraints, attached = constraints_of(setup, settings), setup.attached_vertices
-    count, first = settings.voxels, setup.frames[0]
-    bones = [] if count is None else [VoxelBone(body, count, first) for body in setup.bones]
+class ProgramSurface(MovingSurface):
+    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and bones of voxels."""
 
-    def iterate(points: Floats, velocity: Floats, frame: int) -> tuple[Floats, Floats]:
-        carry(points, setup, frame)
-        for bone in bones:
-            bone.move(frame)
-        for _ in range(settings.sub_iterations):
-            goals = (1 - settings.damping) * velocity * STEP + points
-            project(goals, constraints, settings.bending)
-            reached = collided(points, goals, bones)
+    def __init__(self, setup: Setup, settings: ProgramSettings) -> None:
+        super().__init__(setup)
+        self.settings, self.constraints = settings, constraints_of(setup, settings)
+        self.velocity, self.bones = np.zeros_like(self.points), list[VoxelBone]()
+        if settings.voxels is not None:
+            self.bones = [VoxelBone(body, settings.voxels, setup.frames[0]) for body in setup.bones]
+        self.cost["projections"] = 0.0
+
+    def move(self, number: int) -> None:
+        """Run one iteration."""
+        carry(self.points, self.setup, number)
+        for bone in self.bones:
+            bone.move(number)
+        points, attached = self.points, self.setup.attached_vertices
+        for _ in range(self.settings.sub_iterations):
+            goals = (1 - self.settings.damping) * self.velocity * STEP + points
+            project(goals, self.constraints, self.settings.bending)
+            reached = collided(points, goals, self.bones)
             reached[attached] = points[attached]
-            points, velocity = reached, (reached - points) * (1 / STEP)
-        return points, velocity
-
-    sweep = len(constraints.edges) + len(constraints.hinges) + 1
-    return MovingSurface(setup, iterate, sweep * settings.sub_iterations)
+            points, self.velocity = reached, (reached - points) * (1 / STEP)
+        self.points = points
+        self.cost["projections"] += self.constraints.count * self.settings.sub_iterations
 
 
 def project(points: Floats, at: PbdConstraints, bending: float) -> None:

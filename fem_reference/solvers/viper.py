@@ -28,7 +28,7 @@ from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bon
 from fem_reference.solvers.common.frame_loop import carry, follow
 from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import Stiffness
 from fem_reference.solvers.viper_kernels import (
     matrices,
@@ -121,7 +121,7 @@ class Rods:
         if settings.contact:
             at, attached = problem.surface.points, problem.attached_vertices
             self.skin_bones = colliding_bones(problem.bones, at, attached, 0.0)
-        self.checks = surface_checks(problem.surface, problem.attached_vertices)
+        self.check = SurfaceCheck(problem.surface, problem.attached_vertices)
         free = settings.points - 2
         self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free + 1) + 2))}
 
@@ -196,7 +196,7 @@ class Rods:
 
     def trouble(self) -> Trouble | None:
         """The trouble with the surface; None without."""
-        return first_trouble(self.checks, self.surface)
+        return self.check.trouble(self.surface)
 
     def frame(self, number: int) -> Frame:
         """Surface and fibres; scalars: the volume of the rods over that at rest, the least and the greatest of the segments."""

@@ -14,7 +14,6 @@ Frame number n is the state after iteration n, ``frame_time`` after the one befo
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -191,37 +190,37 @@ def advance(
 
 def solve(setup: Setup, settings: XpbdSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    model = timed(partial(moving_surface, settings), setup)
-    outcome = follow(model, setup, sink, settings.sub_steps)
+    outcome = follow(timed(XpbdSurface, setup, settings), setup, sink, settings.sub_steps)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 
 
-def moving_surface(settings: XpbdSettings, setup: Setup) -> MovingSurface:
-    """The surface of ``setup`` with its constraints."""
-    constraints = XpbdConstraints.at_rest(setup.surface, setup.attached_vertices, settings)
-    contacts = _contacts(setup, settings)
-    step = XpbdStep(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
+class XpbdSurface(MovingSurface):
+    """A surface with its constraints, the ``velocities`` (n, 3) [mm/s] of its vertices, and bones in contact with it."""
 
-    def iterate(points: Floats, velocities: Floats, frame: int) -> tuple[Floats, Floats]:
-        for number in range(1, settings.sub_steps + 1):
-            now = frame - 1 + number / settings.sub_steps
-            carry(points, setup, now)
-            for contact in contacts:
-                contact.bone.move(now)
-            points, velocities = advance(points, velocities, constraints, step, contacts)
-        return points, velocities
+    def __init__(self, setup: Setup, settings: XpbdSettings) -> None:
+        super().__init__(setup)
+        surface, attached = setup.surface, setup.attached_vertices
+        self.settings, self.constraints = settings, XpbdConstraints.at_rest(surface, attached, settings)
+        self.step = XpbdStep(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
+        self.velocities, self.contacts = np.zeros_like(self.points), list[BoneContact]()
+        if (collision := settings.collision) is not None:
+            softness = 1 / (collision.stiffness * vertex_areas(surface.points, surface.triangles))
+            bones = colliding_bones(setup.bones, surface.points, attached, collision.gap)
+            self.contacts = [BoneContact(bone, softness) for bone in bones]
+        self.cost["projections"] = 0.0
 
-    sweep = len(constraints.edges) + len(constraints.hinges) + (settings.volume is not None)
-    return MovingSurface(setup, iterate, sweep * settings.sweeps * settings.sub_steps)
-
-
-def _contacts(setup: Setup, settings: XpbdSettings) -> list[BoneContact]:
-    """One of each bone, where there is contact."""
-    if settings.collision is None:
-        return []
-    softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface.points, setup.surface.triangles))
-    places = setup.surface.points, setup.attached_vertices
-    return [BoneContact(bone, softness) for bone in colliding_bones(setup.bones, *places, settings.collision.gap)]
+    def move(self, number: int) -> None:
+        """Run one iteration, of ``sub_steps`` time steps."""
+        now, chosen = (self.points, self.velocities), self.settings
+        for step in range(1, chosen.sub_steps + 1):
+            frame = number - 1 + step / chosen.sub_steps
+            carry(now[0], self.setup, frame)
+            for contact in self.contacts:
+                contact.bone.move(frame)
+            now = advance(*now, self.constraints, self.step, self.contacts)
+        self.points, self.velocities = now
+        sweep = len(self.constraints.edges) + len(self.constraints.hinges) + (chosen.volume is not None)
+        self.cost["projections"] += sweep * chosen.sweeps * chosen.sub_steps
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
