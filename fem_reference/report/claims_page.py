@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
 from fem_reference.io.texts import finite
 from fem_reference.metrics import described
-from fem_reference.report.drawings import PALETTE, Drawing, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 from fem_reference.report.words import words
 
@@ -68,8 +68,8 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
         ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
         for i, case in enumerate(dict.fromkeys(one.case for one in claims)):
             some = [one for one in shown if one.case == case]
-            colour = PALETTE[i % len(PALETTE)]
-            axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
+            look = {"color": colour_of(i + 1), "label": case, "alpha": 0.7}
+            axes.plot([one.error for one in some], [one.bar for one in some], ".", **look)
         axes.plot(ends, ends, color="#555555", linewidth=1)
         axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")
         logarithmic(axes)

@@ -14,7 +14,7 @@ from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
 from fem_reference.io.texts import finite
 from fem_reference.metrics import Statistic, described
-from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
 # Control points in the plane, as in the report's Figure 3.1.
@@ -69,11 +69,6 @@ def facts(found: Estimation) -> dict[str, Any]:
     return {**rows, "missing": found.missing}
 
 
-def _style(i: int) -> dict[str, Any]:
-    """The look of the i-th technique."""
-    return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
-
-
 def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:
     """The errors by what they have under ``names``."""
     found = dict[tuple[object, ...], list[Error]]()
@@ -88,7 +83,7 @@ def _figure() -> Drawing:
     def draw(_: Figure, axes: Axes) -> None:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
             line = make(_POINTS)(np.linspace(0, 1, 400))
-            axes.plot(*line.T, linewidth=1.4, **_style(i), label=name)
+            axes.plot(*line.T, linewidth=1.4, **look_of(i + 1), label=name)
         axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
         axes.set_xlabel("x")
         axes.set_ylabel("y")
@@ -106,7 +101,7 @@ def _curves(found: Estimation) -> Drawing:
             means = [
                 np.mean([one.rms for one in found.curves if (one.technique, one.known) == (name, n)]) for n in counts
             ]
-            axes.plot(counts, means, marker="o", markersize=3, **_style(i), label=name)
+            axes.plot(counts, means, marker="o", markersize=3, **look_of(i + 1), label=name)
         logarithmic(axes)
         axes.set_xticks(counts)
         axes.set_xlabel("known points of a fibre")
