@@ -1,7 +1,6 @@
 """The page ``estimation``: curves, radial basis functions and implicit surfaces of the report's chapter 3 and section 7.1."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from fem_reference.assessment.estimation import Estimation
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import Statistic, described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
@@ -60,13 +59,8 @@ def said(found: Estimation) -> str:
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    names = ("curves", "heights", "fits", "decompositions", "answers")
-    rows = {name: [asdict(one) for one in getattr(found, name)] for name in names}
-    for one in rows["heights"]:
-        one["condition"] = finite(one["condition"])
-    for one in rows["answers"]:
-        one |= {key: {name: finite(value) for name, value in one[key].items()} for key in ("changes", "bars")}
-    return {**rows, "missing": found.missing}
+    names = ("curves", "heights", "fits", "decompositions", "answers", "missing")
+    return {name: plain(getattr(found, name)) for name in names}
 
 
 def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:

@@ -38,12 +38,13 @@ def page(table: Table) -> Page:
 
 def facts(table: Table) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
+    scenarios = [
+        {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
+        | {"reference": one.reference.status, "message": one.reference.message}
+        for one in table.scenarios
+    ]
     return {
-        "scenarios": [
-            {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
-            | {"reference": one.reference.status, "message": one.reference.message}
-            for one in table.scenarios
-        ],
+        "scenarios": scenarios,
         "missing": table.missing,
         "report": [one.model_dump(mode="json", exclude={"of_case"}) for one in table.kinds],
         "results": [_row(one) for one in table.results],
@@ -74,15 +75,10 @@ def _row(one: SolverResult) -> dict[str, Any]:
     worst = {}
     for metric, statistic, _, unit in COLUMNS:
         found = one.worst(metric, statistic)
-        value = None if found is None else {"value": finite(found[0]), "frame": found[1], "unit": unit}
-        worst[f"{metric}.{statistic}"] = value
-    return {
-        **{name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")},
-        "needs": dict(one.needs),
-        "status": one.outcome.status,
-        "message": one.outcome.message,
-        "worst": worst,
-    }
+        worst[f"{metric}.{statistic}"] = found and {"value": finite(found[0]), "frame": found[1], "unit": unit}
+    named = {name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")}
+    ended = {"status": one.outcome.status, "message": one.outcome.message}
+    return {**named, "needs": dict(one.needs), **ended, "worst": worst}
 
 
 def _drawing(table: Table) -> Drawing:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, solvers
+from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
 from fem_reference.assessment.transfer import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
@@ -99,18 +99,17 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
     """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
-    points = case.counted
-    tables = [
+    asked = [(case.counted, cost, cost, error) for cost in MATCHED]
+    # What "at most" means of an error here is what it means to the verb recommend.
+    asked.append((case.certain, TIME, error, TIME))
+    return [
         (
-            cost,
-            error,
-            [fronts.at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)],
+            same,
+            compared,
+            [match(points, error, cost, same=same, at=at) for at in levels(points, error, cost, same=same)],
         )
-        for cost in MATCHED
+        for points, cost, same, compared in asked
     ]
-    certain = case.certain  # what "at most" means of an error here is what it means to the verb recommend
-    rows = [fronts.at_same_error(certain, error, TIME, at) for at in levels(certain, error, TIME, of_error=True)]
-    return [*tables, (error, TIME, rows)]
 
 
 def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
