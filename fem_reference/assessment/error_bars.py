@@ -19,7 +19,7 @@ from fem_reference.assessment.differences import carried, typical, typical_chang
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
 from fem_reference.runs.store import Run
 
@@ -178,16 +178,8 @@ def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Fl
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
     """Store the error ``bars`` in the ``folder`` of their run; :func:`load` reads them only for the same ``of``."""
-    rows = [
-        vars(bar)
-        | {"values": [finite(value) for value in bar.values]}
-        | {"parts": {name: finite(part) for name, part in bar.parts.items()}}
-        | {"model": None if bar.model is None else [finite(value) for value in bar.model]}
-        for bar in bars.bars
-    ]
     table = {"format": FORMAT, "of": of, "numbers": bars.numbers, "sizes_mm": bars.sizes, "order": bars.order}
-    table["bars"] = rows
-    files.write_text(folder / FILE, json.dumps(table, indent=1, allow_nan=False))
+    files.write_text(folder / FILE, json.dumps(plain(table | {"bars": bars.bars}), indent=1, allow_nan=False))
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:

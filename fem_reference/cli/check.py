@@ -49,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
         facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
-        lost = regression_texts.lost(scene.name, candidate.name, why)
-        write(options.junit, lost.junit)
-        write(options.markdown, lost.markdown)
+        junit, markdown = regression_texts.lost(scene.name, candidate.name, why)
+        write(options.junit, junit)
+        write(options.markdown, markdown)
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.offered(bench, reference, asked=options.error_bar)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.mesh import Floats
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
@@ -95,21 +95,14 @@ def place(versions: Versions) -> str:
 def facts(versions: Versions) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     rows = [
-        {
-            "statistic": one.name,
-            "unit": one.unit,
-            "word": one.word,
-            "frame": one.frame,
-            "was": finite(float(one.was[one.at])),
-            "now": finite(float(one.now[one.at])),
-            "further": finite(one.by),
-            "error_bar": finite(one.bar),
-        }
+        {"statistic": one.name, "unit": one.unit, "word": one.word, "frame": one.frame}
+        | {"was": one.was[one.at], "now": one.now[one.at], "further": one.by, "error_bar": one.bar}
         for one in versions.changes
     ]
     current = versions.current
     named = {"case": current.scene.name, "candidate": current.candidate.name, "against": versions.was}
-    return named | {"counts": {one: versions.count(one) for one in ORDER}, "moved": place(versions), "changes": rows}
+    counts = {one: versions.count(one) for one in ORDER}
+    return dict(plain(named | {"counts": counts, "moved": place(versions), "changes": rows}))
 
 
 def text(versions: Versions) -> str:

@@ -9,7 +9,7 @@ from fem_reference.metrics import described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.drawings import colour_of
+from fem_reference.report.drawings import look_of
 from fem_reference.report.pages import Headlines, Page, template
 from fem_reference.report.sections import facts_of, sections
 from fem_reference.report.sections.origin import changes
@@ -57,11 +57,10 @@ def _failed(comparison: Comparison) -> str:
 
 
 def _key(comparison: Comparison) -> dict[str, Any]:
-    """The key to the page: colours of the curves, and the frames at both ends."""
-    names = [run.name for run in comparison.runs]
+    """The key to the page: the looks of the curves, and the frames at both ends."""
     numbers = comparison.reference.numbers
     ends = [label(comparison.scene, comparison.setup, number) for number in (numbers[0], numbers[-1])]
-    return {"colours": list(zip(names, map(colour_of, range(len(names))), strict=True)), "ends": ends}
+    return {"looks": [(run.name, look_of(i)) for i, run in enumerate(comparison.runs)], "ends": ends}
 
 
 def _shared(comparison: Comparison) -> dict[str, Any]:

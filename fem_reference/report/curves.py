@@ -14,7 +14,16 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, described, find
 from fem_reference.metrics.moment_arm import turning
 from fem_reference.problems.setup import Joint
-from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, colour_of, over_frames, plain_numbers
+from fem_reference.report.drawings import (
+    BAND,
+    NOT_A_NUMBER,
+    REFERENCE,
+    Drawing,
+    colour_of,
+    look_of,
+    over_frames,
+    plain_numbers,
+)
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
@@ -76,15 +85,15 @@ def _draw_runs(
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
             continue
-        one, colour = found[run.name], colour_of(i)
+        one, look = found[run.name], look_of(i)
         if i == 0 and (bar := _bar(comparison, "change", one)) is not None:
             _band(axes, along[shown], one.values[shown], bar[shown])
         kept = replace(one, values=one.values[shown])
-        _line(axes, along[shown], kept, run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
+        _line(axes, along[shown], kept, run.name, linewidth=2.4 if i == 0 else 1.5, **look)
         for end in ("least", "greatest") if one.statistic == "mean" and i == 0 else ():
             if other := find(comparison.changes[run.name], one.metric, end):
                 label = "_" if _RANGE in axes.get_legend_handles_labels()[1] else _RANGE
-                axes.plot(along[shown], other.values[shown], ":", color=colour, linewidth=0.8, label=label)
+                axes.plot(along[shown], other.values[shown], ":", color=REFERENCE, linewidth=0.8, label=label)
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:

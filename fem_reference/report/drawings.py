@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter
 from PIL import Image
@@ -20,8 +21,11 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
+# resemble none of these.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933", "#332288", "#777777")
+# Lines of so many runs are told apart by colour alone; the next ones are broken.
+_BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
 LOOK: Any = {
@@ -65,12 +69,24 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The colour of the i-th run, the reference first.
+    """The colour of the i-th run, the reference first: the palette, then its colours ever darker.
 
-    >>> colour_of(0), colour_of(1)
-    ('#222222', '#0072b2')
+    >>> colour_of(0), colour_of(1), colour_of(11)
+    ('#222222', '#0072b2', '#004c77')
     """
-    return REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+    if i == 0:
+        return REFERENCE
+    darker, k = divmod(i - 1, len(PALETTE))
+    return to_hex(np.array(to_rgb(PALETTE[k])) * (2 / 3) ** darker)
+
+
+def look_of(i: int) -> dict[str, Any]:
+    """The colour and the dashes of the line of the i-th run, the reference first.
+
+    >>> look_of(1), look_of(7)
+    ({'color': '#0072b2', 'linestyle': '-'}, {'color': '#882255', 'linestyle': '--'})
+    """
+    return {"color": colour_of(i), "linestyle": _DASHES[max(i - 1, 0) // _BY_COLOUR % len(_DASHES)]}
 
 
 def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:

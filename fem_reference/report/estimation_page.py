@@ -1,7 +1,6 @@
 """The page ``estimation``: curves, radial basis functions and implicit surfaces of the report's chapter 3 and section 7.1."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,9 @@ from fem_reference.assessment.estimation import Estimation
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import Statistic, described
-from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
 # Control points in the plane, as in the report's Figure 3.1.
@@ -60,18 +59,8 @@ def said(found: Estimation) -> str:
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    names = ("curves", "heights", "fits", "decompositions", "answers")
-    rows = {name: [asdict(one) for one in getattr(found, name)] for name in names}
-    for one in rows["heights"]:
-        one["condition"] = finite(one["condition"])
-    for one in rows["answers"]:
-        one |= {key: {name: finite(value) for name, value in one[key].items()} for key in ("changes", "bars")}
-    return {**rows, "missing": found.missing}
-
-
-def _style(i: int) -> dict[str, Any]:
-    """The look of the i-th technique."""
-    return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
+    names = ("curves", "heights", "fits", "decompositions", "answers", "missing")
+    return {name: plain(getattr(found, name)) for name in names}
 
 
 def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:
@@ -88,7 +77,7 @@ def _figure() -> Drawing:
     def draw(_: Figure, axes: Axes) -> None:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
             line = make(_POINTS)(np.linspace(0, 1, 400))
-            axes.plot(*line.T, linewidth=1.4, **_style(i), label=name)
+            axes.plot(*line.T, linewidth=1.4, **look_of(i + 1), label=name)
         axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
         axes.set_xlabel("x")
         axes.set_ylabel("y")
@@ -106,7 +95,7 @@ def _curves(found: Estimation) -> Drawing:
             means = [
                 np.mean([one.rms for one in found.curves if (one.technique, one.known) == (name, n)]) for n in counts
             ]
-            axes.plot(counts, means, marker="o", markersize=3, **_style(i), label=name)
+            axes.plot(counts, means, marker="o", markersize=3, **look_of(i + 1), label=name)
         logarithmic(axes)
         axes.set_xticks(counts)
         axes.set_xlabel("known points of a fibre")

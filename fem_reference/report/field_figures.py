@@ -19,7 +19,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
-from fem_reference.report.drawings import LOOK, PALETTE, REFERENCE, Drawing, drawn, positive, webp
+from fem_reference.report.drawings import LOOK, Drawing, colour_of, drawn, positive, webp
 from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
@@ -50,7 +50,7 @@ def convergence(example: Comparison) -> Drawing:
 
     def draw(axes: Axes) -> None:
         for i, (element, cells, errors) in enumerate(lines):
-            axes.loglog(cells, errors, "o-", color=PALETTE[i % len(PALETTE)], label=element)
+            axes.loglog(cells, errors, "o-", color=colour_of(i + 1), label=element)
         axes.set_xlabel("cells")
         axes.set_ylabel("error")
 
@@ -107,8 +107,9 @@ def _look(i: int, run: Run) -> dict[str, Any]:
     """The listing as its own ``plot`` command draws it, the others by their place."""
     if run.solver == "listing":
         return dict(_LISTING)
-    colour = REFERENCE if i == 0 else PALETTE[i % len(PALETTE)]
-    return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": _MARKERS[i % len(_MARKERS)], "markersize": 3}
+    marker = _MARKERS[i % len(_MARKERS)]
+    colour = colour_of(i + 1 if i else 0)  # the first of the palette is like that of the listing
+    return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": marker, "markersize": 3}
 
 
 def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:

@@ -1,7 +1,6 @@
 """The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
 
 import math
-from itertools import cycle
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -12,7 +11,7 @@ from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.io.texts import finite
 from fem_reference.metrics import described
-from fem_reference.report.drawings import PALETTE, REFERENCE, Drawing, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 from fem_reference.report.words import ratio
 
@@ -21,8 +20,6 @@ COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solv
 # In the first table, which is over all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
-# Beyond the palette of curves: of Tol's muted colours those that are none of its own.
-_MORE = ("#882255", "#999933", "#332288", "#777777")
 
 
 def page(table: Table) -> Page:
@@ -41,12 +38,13 @@ def page(table: Table) -> Page:
 
 def facts(table: Table) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
+    scenarios = [
+        {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
+        | {"reference": one.reference.status, "message": one.reference.message}
+        for one in table.scenarios
+    ]
     return {
-        "scenarios": [
-            {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
-            | {"reference": one.reference.status, "message": one.reference.message}
-            for one in table.scenarios
-        ],
+        "scenarios": scenarios,
         "missing": table.missing,
         "report": [one.model_dump(mode="json", exclude={"of_case"}) for one in table.kinds],
         "results": [_row(one) for one in table.results],
@@ -77,15 +75,10 @@ def _row(one: SolverResult) -> dict[str, Any]:
     worst = {}
     for metric, statistic, _, unit in COLUMNS:
         found = one.worst(metric, statistic)
-        value = None if found is None else {"value": finite(found[0]), "frame": found[1], "unit": unit}
-        worst[f"{metric}.{statistic}"] = value
-    return {
-        **{name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")},
-        "needs": dict(one.needs),
-        "status": one.outcome.status,
-        "message": one.outcome.message,
-        "worst": worst,
-    }
+        worst[f"{metric}.{statistic}"] = found and {"value": finite(found[0]), "frame": found[1], "unit": unit}
+    named = {name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")}
+    ended = {"status": one.outcome.status, "message": one.outcome.message}
+    return {**named, "needs": dict(one.needs), **ended, "worst": worst}
 
 
 def _drawing(table: Table) -> Drawing:
@@ -108,7 +101,7 @@ def _drawing(table: Table) -> Drawing:
 def _colours(table: Table) -> dict[str, str]:
     """A colour for everybody who is drawn."""
     names = dict.fromkeys(_label_of(one) for one in table.results if not one.of_reference and _place(one) is not None)
-    return {"reference": REFERENCE} | dict(zip(names, cycle([*PALETTE, *_MORE]), strict=False))
+    return {name: colour_of(i) for i, name in enumerate(["reference", *names])}
 
 
 def _label_of(one: SolverResult) -> str:

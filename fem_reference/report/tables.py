@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment import ranking, second_check
-from fem_reference.assessment.comparison import Alone, Comparison, Convergence
+from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import finite, plain
 from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
@@ -46,7 +46,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
         "rankings": ranking.facts(comparison.rankings),
     }
-    return facts | ({"convergence": [_ladder(ladder) for ladder in comparison.ladders]} if comparison.ladders else {})
+    return facts | ({"convergence": plain(comparison.ladders)} if comparison.ladders else {})
 
 
 def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
@@ -104,11 +104,6 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
     ]
 
 
-def _ladder(ladder: Convergence) -> dict[str, Any]:
-    errors = [finite(error) for error in ladder.errors]
-    return vars(ladder) | {"errors": errors, "order": finite(ladder.order)}
-
-
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
     """One row a frame; ``model``: by how much exact attachments change the statistic, where they are springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
@@ -126,6 +121,5 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
         **{name: getattr(expectation, name) for name in ("of", "metric", "statistic", "kind", "because")},
         **{name: getattr(verdict, name) for name in ("frame", "truth", "within", "unit")},
         "expected_at": expectation.frame,
-        "value": finite(verdict.value),
-        "error_bar": None if verdict.error_bar is None else finite(verdict.error_bar),
+        **plain({"value": verdict.value, "error_bar": verdict.error_bar}),
     }
