@@ -21,7 +21,7 @@ _VECTORS = ("force_{}_N", "at_{}_mm", "moment_{}_N_mm")
 COLUMNS = (
     *("run", "frame", "bone", "joint", "angle_deg"),
     *(name.format(axis) for name in _VECTORS for axis in "xyz"),
-    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS)),
+    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS), "moment_arm_by_force_mm"),
 )
 _NOWHERE = np.zeros(3)
 
@@ -46,7 +46,8 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
     about = lost[:, 0] if joint is None else moment @ joint.axis
     angles = lost[:, 0] if joint is None else np.degrees(joint.angles(numbers))
     alone = turning(setup.joints, context, numbers) == i
-    measures = [find(comparison.changes[run.name], "moment_arm", one) for one in _ARMS]
+    names = [*(("moment_arm", one) for one in _ARMS), ("joint_moment", "arm")]
+    measures = [find(comparison.changes[run.name], *name) for name in names]
     arms = np.array([lost[:, 0] if one is None else np.where(alone, one.values, np.nan) for one in measures])
     columns = np.column_stack([angles, force, at, moment, about, arms.T]).tolist()
     for number, values in zip(numbers, columns, strict=True):

@@ -272,7 +272,7 @@ def test_a_file_that_was_cut_off_is_named(tmp_path) -> None:
 def test_forces_and_moments_have_bars_in_their_own_units() -> None:
     """100 N a frame along y at 30 mm along z from an axis along x, 10 % more on tetrahedra of twice the size: of an error a h^1.5
     the sizes differ by 1.83 a h^1.5; the force, one number at one place, is taken to be of first order, and a fifth less certain.
-    Without forces there is no bar.
+    The arm is 30 mm on both, and unknown at rest. Without forces there is no bar.
     """
     motion = Rotation((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2))
     bone = Bone("femur", REST, motion)
@@ -292,5 +292,8 @@ def test_forces_and_moments_have_bars_in_their_own_units() -> None:
             bar = found.find(of, "joint_moment", statistic)
             assert bar is not None
             assert (bar.unit, bar.values) == (unit, pytest.approx(1.25 * wanted * TIMES, abs=1e-9))
+        arm = found.find(of, "joint_moment", "arm")
+        assert arm is not None
+        assert arm.values == pytest.approx([np.nan, 0, 0], abs=1e-12, nan_ok=True)
     assert found.find("change", "moment_arm", "mean") is not None
     assert bars().find("change", "joint_moment", "force") is None
