@@ -82,8 +82,8 @@ def test_over_the_tube_of_a_ring(tube) -> None:
 
 def test_through_the_hole_of_a_ring_it_is_straight() -> None:
     ring = Ring(np.eye(4), 10.0, 2.0)
-    starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0]]), np.array([[-3.0, 1, -7], [0.0, 8, 0]])
-    paths = around([ring], starts, ends)  # the second between two points of the inner circle
+    starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0], [0, 0, 9]]), np.array([[-3.0, 1, -7], [0.0, 8, 0], [0, 0, -9]])
+    paths = around([ring], starts, ends)  # the second between two points of the inner circle, the third along the axis
     assert not paths.failed.any()
     assert_allclose(paths.lengths, np.linalg.norm(ends - starts, axis=1), rtol=1e-12)
 
@@ -145,3 +145,13 @@ def test_a_tube_so_thin_that_a_string_slips_past_it_has_no_path() -> None:
     paths = around([Ring(np.eye(4), 10.0, 0.1)], starts, ends)
     assert paths.failed.tolist() == [False]
     assert_allclose(paths.lengths, 2 * math.hypot(9, 2.1), rtol=1e-4)
+
+
+def test_a_path_much_longer_than_the_string_has_failed() -> None:
+    """The way over a ball beside a string that slipped through it, which is 3 % shorter."""
+    starts, ends = np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])
+    found = around([BALL], starts, ends)
+    straight = starts[:, None] + np.linspace(0, 1, 9)[None, :, None] * (ends - starts)[:, None]
+    assert 1.02 < found.lengths[0] / 20 < 1.15
+    assert winding._wrong([BALL], found, straight).tolist() == [True]
+    assert winding._wrong([BALL], found, sampled(found, 99)).tolist() == [False]
