@@ -13,6 +13,8 @@ Flags = NDArray[np.bool_]
 
 # Pieces of a string, its sweeps, and how far beyond the middle of its neighbours they take a point.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
+# Where a string needs more points than this, so that no piece slips past a thin tube, it is not followed further.
+MOST = 10_000
 
 
 def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Floats:
@@ -23,7 +25,7 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
     for ring in rings:  # no piece may slip past a tube
-        while np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
+        while string.shape[1] <= MOST and np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
             string = halved(string)
     for first in (1, 2) * _SWEEPS:
         inner = np.arange(first, string.shape[1] - 1, 2)

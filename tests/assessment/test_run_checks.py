@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference import effects
 from fem_reference.assessment import second_check
-from fem_reference.assessment.run_checks import RunCheck, of_body, of_muscle
+from fem_reference.assessment.run_checks import RunCheck, _give, of_body, of_muscle
 from fem_reference.foundations.motion import Rotation as Turn
 from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.rigid_bodies import Sphere
@@ -76,6 +76,15 @@ def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:
         moved = np.array(run.positions)
         moved[2, free] -= [farther, 0.0, 0.0]
         assert lost(problem, replace(run, positions=moved)) == found
+
+
+def test_contact_gives_way_by_the_pressure_over_its_stiffness(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    for stiffness, given in ((1.0, 0.5), (10.0, 0.05)):
+        contact = effects.make("contact", stiffness=f"{stiffness} MPa/mm", bones=("ball",))
+        pressed = replace(problem, effects=(*problem.effects[:2], contact))
+        none, some = (_give(pressed, problem.bones[2], pressure) for pressure in (0.0, 0.5))
+        assert some - none == pytest.approx(given)
 
 
 def test_bones_that_are_not_in_contact_may_cross(tmp_path) -> None:

@@ -153,3 +153,13 @@ def test_against_itself_zero_and_from_rest_the_arm() -> None:
     assert_allclose(worst.values, arms.max(axis=1), rtol=1e-9)
     assert_allclose([least.values, greatest.values], np.sort(arms, axis=1).T, rtol=1e-9)  # of two fibres
     assert measure(run, run, replace(context, joints=()), ["moment_arm"]) == ()
+
+
+def test_where_a_joint_turns_back_the_way_there_says_nothing() -> None:
+    """A muscle that is longer on the way back, by 2 mm, as a viscous one: its arm there is that of the way back alone."""
+    angles = np.array([0.0, 0.5, 0.1])
+    joint = joint_of(angles)
+    run = straight(joint, 3)
+    lengths = np.array([[30.0], [28.0], [31.0]])
+    arms = excursion_arms(lengths, context_of(joint, run), run.numbers)[:, 0]
+    assert_allclose(arms, [4.0, 4.0, 7.5], rtol=1e-12)

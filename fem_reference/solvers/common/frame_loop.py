@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import TET_FACES, Floats, Polylines, Surface, TetMesh, diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
@@ -15,6 +16,7 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.resolved_paths import posed, skipped
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.scenes.muscle import MOST_FRAMES
 from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 
 # Fractions of a frame at which motions are sampled; a bone that turns too far between these also does between finer ones.
@@ -50,6 +52,9 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
     parts; the model sees the bones at their ends. ``sink`` gets the frames. *Out of steps* where bones move too far in between.
     """
     frames = setup.frames
+    if frames[-1] - frames[0] > MOST_FRAMES:
+        want = f"at most {MOST_FRAMES} frame numbers after the first, as this solver goes through each"
+        raise InputError("frames.last", f"{frames[-1]}, {frames[-1] - frames[0]} after the first", want)
     if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
         return refused(model, frames[0], sink, why)
     sink(model.frame(frames[0]))

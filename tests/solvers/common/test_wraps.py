@@ -6,7 +6,7 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
@@ -63,6 +63,15 @@ def test_what_is_deepest_inside_is_named(given) -> None:
     assert wraps(given, BALL, RING).inside(FIXED, 0) == ("", "")
     fixed[1, 1] = [5, 5, 18]
     assert wraps(given, BALL, RING).inside(fixed, 0) == ("sphere", "a fixed point of line 1 1 mm inside")
+
+
+def test_what_an_obstacle_is_moved_to_is_inside(given) -> None:
+    """A ball of 4 mm, 20 mm off the axis that its bone turns about: inside it is what its centre has come to, not where it was."""
+    centre = apply(SWING.pose(10), np.array([[5.0, 5, 15]]))[0]
+    fixed = np.array([[[5.0, 4, 0], centre]])
+    assert wraps(given, BALL).inside(fixed, 10) == ("sphere", "a fixed point of line 0 4 mm inside")
+    assert wraps(given, BALL).inside(fixed, 0) == ("", "")
+    assert wraps(given, BALL).inside(np.array([[[5.0, 4, 0], [5, 5, 15]]]), 10) == ("", "")
 
 
 @pytest.mark.parametrize(
