@@ -14,7 +14,7 @@ _MOST = 3 * 10**7
 
 
 def read(path: Path) -> list[tuple[float, Floats, Ints]]:
-    """Time, points where they are then, and triangles of each step."""
+    """Time, positions of the points, and triangles of each step."""
     import meshio
 
     for item in parsed_xml(path).iter("DataItem"):
