@@ -1,4 +1,4 @@
-"""A check in words: as text, as JSON, as Markdown for a pull request, and as JUnit XML for what shows the tests of a pipeline."""
+"""A check in words: as text, JSON, Markdown for a pull request, and JUnit XML for the test page of a pipeline."""
 
 import math
 from dataclasses import dataclass
@@ -98,7 +98,7 @@ class Lost:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> Lost:
-    """A suite with one error, and a headline, with ``why`` nothing could be judged: what an earlier check left would mislead."""
+    """A suite with one error, and a headline, with the reason ``why`` nothing was judged: older files would mislead."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
