@@ -431,7 +431,10 @@ def _meshes() -> dict[str, Kind]:
     made: dict[str, Callable[[Path], None]] = {suffix: _make_surface(suffix) for suffix in files.surface_suffixes()}
     made |= {"binary.ply": _make_surface(".ply", binary=True), "binary.stl": _make_surface(".stl", binary=True)}
     made |= {"meshio.vtu": _make_surface(".vtu", binary=True), "text.vtu": _make_surface(".vtu", binary=False)}
-    made["text.vtk"] = _make_surface(".vtk", binary=False)
+    made |= {
+        "text.vtk": _make_surface(".vtk", binary=False),
+        "old.msh": _make_surface(".msh", file_format="gmsh22", binary=False),
+    }
     found = {f"surface {name}": Kind(make, "ball*", read_surface) for name, make in made.items()}
     return found | {f"lines {suffix}": Kind(_make_lines(suffix), "lines*", read_lines) for suffix in (".vtk", ".vtp")}
 

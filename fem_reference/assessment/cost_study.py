@@ -43,7 +43,7 @@ class CaseStudy:
 
     @property
     def counted(self) -> tuple[Point, ...]:
-        """The points with their errors bounded below by the truth's bar, as nothing is known below it."""
+        """The points with their errors bounded below by the truth's bar, as smaller errors cannot be distinguished."""
         return self._with_errors(max)
 
     @property

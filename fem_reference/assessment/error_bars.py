@@ -45,7 +45,7 @@ _Differences = dict[Of, list[Floats]]
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The error bar of one statistic: its distance from the truth by the reference's own error, ``values`` (f,) in ``unit``, NaN
+    """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN
     where unknown. It is ``of`` the reference's own change from rest or of a candidate's deviation from the reference. ``parts``: by
     cause, its greatest contribution over the frames.
 

@@ -17,7 +17,7 @@ from fem_reference.problems.setup import Bone
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A run as its health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
+    """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
     ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, with which vertices
     that are ``free`` (n,) may be in contact; ``truth`` (f, n, 3), the vertices of the reference, where they are the same;
     ``integrated`` (f,), V/V0 from the solver itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the

@@ -1,6 +1,6 @@
-"""The verb ``check``: a candidate against its own past and against the reference, for the author's pipeline.
+"""The verb ``check``: a candidate against its own earlier results and against the reference, for the author's pipeline.
 
-An inconclusive result has exit status 0: an uncertain reference is no fault of the change that is checked. The text, the
+An inconclusive result has exit status 0: an uncertain reference is not the fault of the change that is checked. The text, the
 Markdown and the JUnit file (as skipped) say so.
 """
 
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge a candidate by its baseline, after having written that anew where it is asked for."""
+    """Judge a candidate by its baseline, which ``--update`` writes first."""
     begin = time.perf_counter()
     scene = casefile.muscle(scene_of(options), "CASE")
     entry, place = choose(scene, options.candidate, options.unit)

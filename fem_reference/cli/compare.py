@@ -1,4 +1,4 @@
-"""The verb ``compare``: candidates against the reference, or one of them against what it was."""
+"""The verb ``compare``: candidates against the reference, or one of them against its earlier version."""
 
 import argparse
 from pathlib import Path

@@ -1,7 +1,7 @@
 """A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
 Written from FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and
-write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same and what was seen.
+write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same, with measured differences.
 Time is the frame number minus the first.
 """
 
@@ -40,7 +40,7 @@ TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
 def check(case: MuscleCase) -> None:
-    """InputError where a case has an effect that FEBio has not, or not in the same form."""
+    """Raise InputError where FEBio lacks an effect of the case, or has it in another form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             same = ", ".join(name_of(kind) for kind in SAME)

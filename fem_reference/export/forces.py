@@ -27,7 +27,7 @@ _NOWHERE = np.zeros(3)
 
 
 def write_table(comparison: Comparison, path: Path) -> None:
-    """Write a row for each run, frame and bone that has a force or a joint; what is not known is left empty."""
+    """Write a row for each run, frame and bone that has a force or a joint; unknown values are left empty."""
     found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
     write_csv(path, COLUMNS, (["" if value != value else value for value in row] for row in found))
 

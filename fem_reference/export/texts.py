@@ -38,7 +38,7 @@ def paraview_readme(case: MuscleCase, unit: str, *, states: bool) -> str:
 
 
 def candidate() -> str:
-    """An example of what to put beside frames."""
+    """An example of the file ``candidate.toml`` beside frames."""
     return _filled("candidate.toml")
 
 

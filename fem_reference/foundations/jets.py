@@ -1,4 +1,4 @@
-"""Numbers that carry their first and second derivatives: what is computed with them is differentiated without rounding of steps."""
+"""Numbers with their first and second derivatives: whatever is computed from them is differentiated exactly, without steps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Jet:
 
 
 def variables(values: Floats) -> list[Jet]:
-    """The n variables themselves, at points where they have ``values`` (n, ...)."""
+    """The n variables as jets, at points where they have ``values`` (n, ...)."""
     count, along = len(values), (1,) * (values.ndim - 1)
     slopes = np.eye(count).reshape(count, count, *along)
     return [Jet(value, slope, np.zeros((count, count, *along))) for value, slope in zip(values, slopes, strict=True)]

@@ -59,7 +59,7 @@ class State:
 
     @property
     def cofactors(self) -> Sequence[Sequence[Any]]:
-        """``J F^-T`` (3, 3): takes an area vector at rest to where it is now (Nanson)."""
+        """``J F^-T`` (3, 3): maps an area vector at rest to the deformed one (Nanson)."""
         F = self.F
         after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
         return [
@@ -89,10 +89,10 @@ class State:
 
     @property
     def fibre_stretch(self) -> Any:
-        """``J^(-1/3) |F fibre|``: how far the fibre is stretched, without its share in the change of volume."""
+        """``J^(-1/3) |F fibre|``: the stretch of the fibre, without its share in the change of volume."""
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
     def between(self, low: Any, high: Any, x: Any) -> Any:
-        """``x``, or the bound that it lies beyond."""
+        """``x``, or the nearer bound where it lies beyond the bounds."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))

@@ -63,7 +63,7 @@ RELAXING = 10
 
 
 def kept_meshes() -> Path | None:
-    """The folder that keeps tetrahedra; it may be deleted. None: they are made each time."""
+    """The folder of stored tetrahedra; it may be deleted. None: they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 

@@ -1,4 +1,4 @@
-"""Muscles before they are meshed: the surface, the bones that it is attached to and touches, and the frames wanted."""
+"""Muscles before they are meshed: the surface, its bones, its attachments, and the requested frames."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

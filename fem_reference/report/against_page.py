@@ -1,4 +1,4 @@
-"""The page of two versions of one solver: what got better, what worse, and where."""
+"""The page of two versions of one solver: statistics that became better or worse, and the places."""
 
 import math
 from functools import partial
@@ -83,7 +83,7 @@ def _unit(one: Change) -> str:
 
 
 def place(versions: Versions) -> str:
-    """The vertex that moved most, in words; empty where none did."""
+    """The vertex that moved most, in words; empty where none moved."""
     if versions.place is None:
         return ""
     i, vertex, distance = versions.place

@@ -1,4 +1,4 @@
-"""Pages that were asked for by a command: their names, which hold what makes each different, and the index of them."""
+"""Pages requested by a command: their names, which state what makes each different, and the index of pages."""
 
 import hashlib
 import re
@@ -22,8 +22,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page as it is asked for: the ``verb``, the ``base`` of its default name, what determines it, and the name in its folder,
-    empty where it has no folder of its own.
+    """A page as a command requests it: the ``verb``, the ``base`` of its default name, what determines it, and the name in its
+    folder, empty where it has no folder of its own.
     """
 
     verb: str

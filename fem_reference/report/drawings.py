@@ -1,4 +1,4 @@
-"""Drawings that stand inside a page: SVG whose text stays text and whose ids no two drawings share, and pictures as WebP."""
+"""Drawings inside a page: SVG whose text stays text and whose ids are unique, and pictures as WebP."""
 
 import base64
 import io
@@ -101,7 +101,7 @@ def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figu
 
 
 def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], over: str = "frame") -> Drawing:
-    """A drawing of curves over frame numbers, or what else is named by ``over``, with a legend above."""
+    """A drawing of curves over frame numbers, or over the quantity that ``over`` names, with a legend above."""
 
     def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
@@ -124,7 +124,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
 
 
 def logarithmic(axes: Axes) -> None:
-    """Both axes in powers of ten, their numbers as people read them and not as formulas."""
+    """Make both axes logarithmic, with plain numbers instead of formulas."""
     axes.set(xscale="log", yscale="log")
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
@@ -167,12 +167,12 @@ def _named(colour: str) -> str:
 
 
 def webp(picture: Image.Image, quality: int) -> str:
-    """A picture as what stands in ``src``, compressed with ``quality`` of at most 100."""
+    """A picture as the text of ``src``, compressed with a ``quality`` of at most 100."""
     stored = io.BytesIO()
     picture.save(stored, "WEBP", quality=quality, method=4)
     return picture_source(stored.getvalue())
 
 
 def picture_source(stored: bytes) -> str:
-    """A stored WebP picture as what stands in ``src``."""
+    """A stored WebP picture as the text of ``src``."""
     return f"data:image/webp;base64,{base64.b64encode(stored).decode()}"

@@ -1,4 +1,4 @@
-"""The page of omissions: what each effect of a scene and each feature of a candidate changes, and what it costs."""
+"""The page of omissions: the change and the cost of each effect of a scene and each feature of a candidate."""
 
 import math
 from typing import Any

@@ -19,7 +19,7 @@ AGREE = 1e-9  # of the greatest value: what only rounding differs by
 
 
 class Difference(Record):
-    """A place in a ``section`` where the report's ``text`` and its ``listing`` part, and what was ``measured`` of it."""
+    """A place in a ``section`` where the report's ``text`` and its ``listing`` differ, and the ``measured`` difference."""
 
     section: str
     text: str
@@ -80,7 +80,7 @@ def _read[R: Record](table: str, record: type[R]) -> tuple[R, ...]:
 
 
 def apart(example: Comparison) -> str:
-    """In one sentence, how far the listing (else the first candidate) and the equation part at the vertices."""
+    """The difference at the vertices between the listing (else the first candidate) and the equation, in one sentence."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
         return "there is a reference alone, and nothing beside it."

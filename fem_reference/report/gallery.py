@@ -73,7 +73,7 @@ def of_comparison(comparison: Comparison) -> tuple[list[Figure], str]:
 
 
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Figure], str]:
-    """The figures of ``wanted``, or none and what is missing."""
+    """The figures of ``wanted``, or none and the missing software."""
     try:
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:

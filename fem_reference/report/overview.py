@@ -20,7 +20,7 @@ PRINTED = tuple(key for key in described("table") if not key[1].endswith("_perce
 
 
 def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """Everything that a person asks of a case before solving it, as words and numbers by name."""
+    """The facts of interest on a case before it is solved, as words and numbers by name."""
     return {
         "case": case.name,
         "title": case.title,
@@ -113,6 +113,6 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
 
 
 def run_text(run: Run, found: Alone) -> str:
-    """The result of a run that nothing was compared with, line by line."""
+    """The result of a run without a comparison, line by line."""
     printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
     return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])

@@ -1,4 +1,4 @@
-"""A check in words: as text, as JSON, as Markdown for a pull request, and as JUnit XML for what shows the tests of a pipeline."""
+"""A check in words: as text, JSON, Markdown for a pull request, and JUnit XML for the test page of a pipeline."""
 
 import math
 from typing import Any
@@ -89,8 +89,8 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a headline in Markdown, with ``why`` nothing could be judged: what an earlier check left
-    would mislead.
+    """A JUnit suite with one error, and a headline in Markdown, with the reason ``why`` nothing was judged: older files would
+    mislead.
     """
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})

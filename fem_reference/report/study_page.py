@@ -1,4 +1,4 @@
-"""The page of a study: error against cost, who is best at the same cost or error, what half the error costs."""
+"""The page of a study: error against cost, the best solver at the same cost or error, the cost of half the error."""
 
 import json
 from collections.abc import Sequence

@@ -50,7 +50,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
 
 def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
-    """The result of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
+    """The result of a ``run`` without a comparison, with the keys of :func:`summary`."""
     return {
         "case": case.name,
         "solver": run.solver,

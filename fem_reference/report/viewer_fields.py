@@ -3,7 +3,7 @@
 quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
             magnitude; points: of the fibres, as positions
-bars        by quantity and frame, how far [mm] the reference may be from the truth; null where it is not known, nothing without any
+bars        by quantity and frame the error bar [mm] of the reference; null where it is unknown, absent without bars
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
 forces      of each run by frame the arrows: point of application [mm] and force on a bone [N], six numbers each
 joints      of each bone that moves its name, unit, and by frame the angle or the distance

@@ -273,7 +273,7 @@ def _check_rest(case: MuscleCase) -> None:
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Bones have a name each, contact is with some of them, and ``frames`` say how fast time passes where that matters."""
+    """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
     _check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):

@@ -1,4 +1,4 @@
-"""The case of a muscle as frozen records: its bones and how they move, what acts, and which frames are wanted."""
+"""The case of a muscle as frozen records: its bones and their motion, its effects, and the requested frames."""
 
 import math
 from functools import partial

@@ -19,7 +19,7 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "require", 
 
 
 def names(task: Task | None = None) -> list[str]:
-    """The solvers there are, as scene files name them: all, or those for a ``task``."""
+    """The names of all solvers in scene files, or of those for a ``task``."""
     found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not _is_shared(module.name))
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
@@ -80,7 +80,7 @@ def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
 
 
 def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:
-    """MissingSoftware where the solver ``name`` needs what is not installed."""
+    """Raise MissingSoftware where the solver ``name`` needs software that is not installed."""
     find(name, place, task).require(settings)
 
 
@@ -90,7 +90,7 @@ def takes_effects(name: str) -> bool:
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
-    """InputError below ``place`` where ``settings`` do not suit the ``effects``."""
+    """Raise InputError below ``place`` where ``settings`` do not suit the ``effects``."""
     offer = find(name, place, task)
     suits = offer.check_effects if isinstance(offer, MuscleSolver) else None
     if suits is not None:

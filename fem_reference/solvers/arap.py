@@ -1,10 +1,10 @@
-"""ARAP, as rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
+"""ARAP, as rigid as possible: the edges around every vertex keep their shape. Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state after the bones took their pose of frame n: the vertices attached to a bone go with it exactly, and
-from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
-turns. Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
-over its own unknowns, so that the energy never rises; negative weights do not change that, as the matrix is still the
-positive one of linear elements. Attachments by springs are exact here, and there is no contact.
+Frame number n is the state after the bones took their pose of frame n. Attached vertices move with their bone exactly. From the
+state before, the method alternates between the rotations of all cells (local step) and the positions of all other vertices
+(global step). Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise
+eq. 5.10, each over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still
+the positive one of linear elements. Attachments by springs are exact here, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -118,8 +118,8 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and what
-    went wrong with it, if anything did.
+    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and the
+    trouble with it, if any.
     """
 
     points: Floats
@@ -129,7 +129,7 @@ class Relaxed:
 
 
 class Alternation(MovingSurface):
-    """A surface whose free vertices ``relax`` as the attached ones have moved."""
+    """A surface whose free vertices ``relax`` after the attached ones have moved."""
 
     advice = "a slower motion may help"
 
@@ -204,7 +204,8 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached where all are free: as attached ones stay, some of it is missing. What encloses
+        V0 is ``volume`` [mm3]. It is reached where all are free; as attached vertices stay, some of it is missing. A surface that
+        encloses
     nothing stays as it is.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))

@@ -4,7 +4,7 @@
 ``L p' = b + lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the
 positions of the iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's:
 no small change that keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths,
-volume, dihedral angles) start from the ARAP state of the frame; nothing is kept of a velocity. Where both are asked for, the
+volume, dihedral angles) start from the ARAP state of the frame; there are no velocities. Where both are requested, the
 projections come last. As in ``arap``, there is no contact.
 """
 

@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
-shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
+Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest. Between two fixed
+points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
+line goes around an obstacle on the shorter side: where its ends turn beyond opposite points, it changes sides.
 """
 
 from typing import Annotated, Self
@@ -117,7 +117,7 @@ class Shortest:
         return self.found
 
     def ending(self) -> Outcome:
-        """Converged, as every line is; what they go through and around."""
+        """Converged, as every line is; the points and obstacles of the lines."""
         kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
         around = f" or around {self.wraps}" if self.wraps.given else ""
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
@@ -129,7 +129,7 @@ def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
-    """InputError below ``place`` where lines cannot go through and around what the settings say."""
+    """Raise InputError below ``place`` where lines cannot have the points and obstacles of the settings."""
     _made(problem, settings, place)
 
 

@@ -1,9 +1,9 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as Table 5.1 has it: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
-sample fibres and are joined to those near them; here the mesh says which are.) They carry the surface and the fibres along.
-Springs resist neither a change of volume nor a tetrahedron that turns inside out. Attachments are exact, whatever the stiffness
-of an attachment. Contact acts on the masses of the surface: what is between those may be inside.
+A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
+sample fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres.
+Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is
+ignored. Contact acts on the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math
@@ -109,7 +109,7 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs going from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
+    """A muscle as masses and springs that go from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
     bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 

@@ -1,10 +1,10 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
-sub-iteration is a full step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
-velocity is the displacement of a vertex in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
-the order of the vertices, as it does in the report: constraints are projected one after the other. Collisions are found anew
-in every sweep, where line 13 finds them once.
+sub-iteration is a full step of the algorithm. No external force acts, so the time step cancels: in place of velocities
+the displacements of vertices in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the
+result depends on the order of the vertices, since constraints are projected one after the other. Collisions are found anew
+in every sweep; line 13 finds them once.
 """
 
 from collections.abc import Sequence
@@ -122,8 +122,9 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle.
 
-    Where two segments of fibres are as near but for rounding, as at a kink, the first of them counts: turning the scene changes
-    nothing.
+        Where two segments of fibres are equally near up to rounding, as at a kink, the first of them counts, so that turning the
+        scene
+    changes nothing.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
@@ -165,7 +166,7 @@ class PbdSurface(MovingSurface):
 
 
 def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
-    """The constraints of the surface at rest, with the stiffness that fibres leave to its edges."""
+    """The constraints of the surface at rest, with edges that are softer along fibres."""
     surface = setup.surface
     found = PbdConstraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:

@@ -8,8 +8,8 @@ The surface at rest is fitted by Gaussians, four numbers each (``geometry.gaussi
 - each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres grow thin; all radii
   are scaled together until the enclosed volume is that of rest.
 
-A vertex is carried by the Gaussians that make the surface at it, and put back to the level that it had at rest, so that the fit's
-error stays as it was. Attached vertices are exact.
+A vertex moves with the Gaussians that form the surface there, and is then moved to the level that it had at rest, so that the
+error of the fit does not change. Attached vertices are exact.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A sequence of deformed surfaces that somebody else computed, read from their files and checked against the scene."""
+"""A sequence of deformed surfaces that another program computed, read from files and checked against the scene."""
 
 import logging
 import math
@@ -99,7 +99,7 @@ def _about_file(path: Path) -> Path:
 
 
 def origin(settings: RecordedSettings) -> dict[str, Any]:
-    """The origin of a run, as its candidate says."""
+    """The origin of a run, as its ``candidate.toml`` states it."""
     said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
     return {"candidate": said} if said else {}
 

@@ -4,9 +4,9 @@ Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each a
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
 stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
 
-Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is
-neither mass nor time: a frame number begins with the one before, moved by a blend of the bones, and stiffnesses are shares of an
-error, as in ``pbd``: the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
+Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is neither
+mass nor time: a frame number begins with the state before, moved by a blend of the bones. Stiffnesses are shares of an error, as
+in ``pbd``, so the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
 volume. Only rods keep their volume; the surface that they carry may not.
 """
 
@@ -62,8 +62,8 @@ class ViperSettings(Record):
 class Bundle:
     """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``, where points of a section, one of each rod, are tied to those around them.
 
-    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; a point is
-    wanted at the mean of what its groups say.
+    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; the
+    goal of a point is the mean of those of its groups.
     """
 
     def __init__(self, rest: Floats, radius: float) -> None:
@@ -94,7 +94,7 @@ class Bundle:
 
 
 class Rods:
-    """A muscle as rods going from frame number to frame number."""
+    """A muscle as rods that go from frame number to frame number."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -134,7 +134,7 @@ class Rods:
         return colliding_bones(self.problem.bones, points, ends, self.radius)
 
     def move(self, number: int) -> None:
-        """Find the rods at a frame, and what they carry."""
+        """Find the rods at a frame, and the surface and fibres that follow them."""
         self._begin(number)
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)

@@ -107,7 +107,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial without those that are their solver's own anyway: a case may name them, and another not."""
+    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)

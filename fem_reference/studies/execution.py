@@ -106,7 +106,7 @@ class Bench[C: Case]:
                 offer.check_problem(own, self.given(offer, own), join(self.scene.place, place))
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
+        """The run of a solver of this package, by its name on pages; ``place`` is where the scene chooses it."""
         run = self._run(name, choice, place, self._made)
         assert run is not None  # what is not stored is made
         return run
@@ -191,11 +191,11 @@ class Bench[C: Case]:
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
-        """The thing that a solver is given: the problem, or the setup of a muscle that it does not need filled."""
+        """The input of a solver: the problem, or for a solver without tetrahedra the set-up of the muscle."""
         return self._problem() if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
+        """A recorded run, checked against the set-up of the scene; it is read each time and not stored."""
         wanted, frames = self.settings(choice, place), list[Frame]()
         assert isinstance(wanted, recorded.RecordedSettings)
         outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
@@ -204,7 +204,7 @@ class Bench[C: Case]:
         return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
-        """The folder in which the run of a solver of our own is stored, once there is one."""
+        """The folder of the stored run of a solver of this package, which exists once the run is made."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def key(self, solver: str, settings: Record) -> str:

@@ -80,7 +80,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
 
 def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
-    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; no name is too odd for that."""
+    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; names may be any text."""
     around, paths = dict[str, Surface](), {"muscle": "muscle.ply"}
     for name, surface in bones.items():
         clean = _distinct(name if is_name(name) else _cleaned(name), {"muscle", *around})
@@ -95,7 +95,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """True where a scene can call something so."""
+    """True where a scene file can use it as a name."""
     try:
         return bool(check_name(name))
     except ValueError:

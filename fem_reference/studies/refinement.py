@@ -1,4 +1,4 @@
-"""Runs that error bars are made of: on coarser tetrahedra, and on these with every other cause of numerical error halved."""
+"""Runs for error bars: on coarser tetrahedra, and on these with each other cause of numerical error halved."""
 
 import hashlib
 import logging

@@ -55,7 +55,7 @@ def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:
-    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
+    """The ``choice`` of a run that is only measured: the reference stores no states."""
     return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
 
 

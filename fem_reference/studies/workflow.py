@@ -1,4 +1,4 @@
-"""The steps from a case to a page, one call each: what the package offers to Python."""
+"""The steps from a case to a page, one call each: the Python API."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -54,7 +54,7 @@ def solve(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
-    """Solve a case, or take up what was solved before: a run is stored by all that determines it.
+    """Solve a case, or read its stored run: runs are stored under all that determines them.
 
     Parameters
     ----------

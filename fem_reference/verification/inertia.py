@@ -67,7 +67,7 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
     """The change of elastic, kinetic and potential energy together over the greatest kinetic energy, of a block clamped at one side
-    that its own weight bends, at once: it swings.
+    that swings under its own weight, applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -98,7 +98,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The force of inertia over what it is in the limit, by pulls that take twice as long: it is of order 2 in the speed."""
+    """The force of inertia over its limit for slow motion, by pulls that take twice as long: it is of order 2 in the speed."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)

@@ -1,4 +1,4 @@
-"""The reference against its own rest state, and what is to be known before trusting it."""
+"""The reference against its own rest state, and warnings about it."""
 
 import math
 from typing import Any
@@ -14,7 +14,7 @@ from fem_reference.runs.store import Run
 
 
 def facts(_: Comparison) -> dict[str, Any]:
-    """The functions that its tiles and alarms are made of."""
+    """The functions for its tiles and warnings."""
     found = {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
     return found | {"energy_gap_limit": ENERGY_GAP, "second_check": second_check.texts_of}
 
@@ -32,6 +32,6 @@ def gap(run: Run) -> float:
 
 
 def least(measure: Measure) -> float:
-    """The smallest value of a measure over the frames where it is a number, NaN where it nowhere is."""
+    """The smallest value of a measure over the frames where it is a number, NaN without such a frame."""
     known = measure.values[np.isfinite(measure.values)]
     return float(known.min()) if len(known) else math.nan

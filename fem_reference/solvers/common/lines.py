@@ -169,7 +169,7 @@ def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
 
 
 def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) -> int:
-    """The index of what has this ``name``; InputError at ``place`` where nothing has."""
+    """The index of the item with this ``name``; InputError at ``place`` where there is none."""
     names = [one.name for one in named]
     if name not in names:
         raise InputError(

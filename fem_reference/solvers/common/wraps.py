@@ -1,4 +1,4 @@
-"""Obstacles on bones that lines go around: their settings, the paths around them, and what is inside them."""
+"""Obstacles on bones that lines go around: their settings, the paths around them, and points inside them."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -100,7 +100,7 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The obstacle that has a fixed point deepest inside, and how deep of which line; empty where none is inside."""
+        """The obstacle with the deepest fixed point inside, its depth and its line, in words; empty where none is inside."""
         found = []
         for one, surface in zip(self.given, self._moved(number), strict=True):
             points = fixed.reshape(-1, 3)

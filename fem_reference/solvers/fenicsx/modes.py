@@ -1,6 +1,6 @@
 """The softest mode of a body: departures along it from an unstable equilibrium, and limit points at which its stiffness is 0.
 
-At a limit point a path of equilibria turns back in time, with no state near beyond.
+At a limit point the path of equilibria ends: at a later frame there is no equilibrium nearby.
 """
 
 from dataclasses import dataclass

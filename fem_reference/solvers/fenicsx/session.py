@@ -82,8 +82,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Meanwhile all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already shared
-    process remains in use. Without FEniCSx nothing is solved and nothing shared.
+    """A context in which all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already
+    shared process remains in use. Without FEniCSx nothing is solved and nothing shared.
     """
     with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)

@@ -1,6 +1,6 @@
 """The independent second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
 
-``field`` has scalar fields; ``body`` has bodies, whose stress and stiffness are the derivatives that ``jets`` carry along.
+``field`` solves scalar fields, ``body`` bodies, whose stress and stiffness are derivatives of energies by ``jets``.
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver

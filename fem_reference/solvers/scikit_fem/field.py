@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-A triangle in space is laid flat, each for itself, before it is assembled: what the equations ask of a surface (lengths and areas
-within it) is not changed by that, and gradients are turned back into space.
+Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and
+areas within it); gradients are turned back into space.
 """
 
 import time
@@ -40,7 +40,7 @@ class ScikitFieldSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Flat:
-    """A mesh as scikit-fem sees it: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
+    """A mesh in the form of scikit-fem: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
     coordinates (t,) to the coordinates of the domain (d,).
     """
 
