@@ -77,7 +77,9 @@ def colour_of(i: int) -> str:
     if i == 0:
         return REFERENCE
     darker, k = divmod(i - 1, len(PALETTE))
-    return to_hex(np.array(to_rgb(PALETTE[k])) * (2 / 3) ** darker)
+    red, green, blue = to_rgb(PALETTE[k])
+    share = (2 / 3) ** darker
+    return to_hex((share * red, share * green, share * blue))
 
 
 def look_of(i: int) -> dict[str, Any]:
