@@ -12,7 +12,7 @@ never branches on a parameter and uses it with operators and ``state.functions``
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -23,8 +23,8 @@ from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.material_point import State as State
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
@@ -77,11 +77,11 @@ class Effect(Record):
         """The stiffness that it gives the body at rest."""
         return Moduli()
 
-    def resultant(self, volume: float, area: Callable[[str], float]) -> Floats | None:  # noqa: ARG002
-        """The force (3,) [N] of its full amount on a whole body of this ``volume`` [mm3] and, by region, ``area`` [mm2], both at
-        rest; None where that depends on the deformation.
+    def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
+        """The force and moment of its full amount on a whole body of this ``shape``; None where they are unknown or depend on
+        more, such as velocities within a load step.
         """
-        return None if self.outer else np.zeros(3)
+        return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
         """The evidence that a scene needs it, known before a solution; None for a part of the material, which is always

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
 from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.foundations.loads import Shape, Wrench
 
 
 class Pressure(Ramped, Load):
@@ -26,6 +27,11 @@ class Pressure(Ramped, Load):
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
+
+    def resultant(self, shape: Shape) -> Wrench | None:
+        """The load on the whole part as it is now."""
+        found = shape.facing(self.on)
+        return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""

@@ -13,6 +13,7 @@ from fem_reference.effects import Effect, Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.loads import Wrench, total
 from fem_reference.foundations.mesh import (
     Floats,
     Polylines,
@@ -34,6 +35,7 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.kept_meshes import cached as cached_mesh
 from fem_reference.geometry.nested import refined
+from fem_reference.geometry.quadratic import Displaced
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.geometry.signed_distance import Grid
@@ -130,17 +132,14 @@ class MuscleProblem(Setup):
         """The effect of contact, None where there is none."""
         return among(self.effects)
 
-    def load(self, frame: float) -> Floats | None:
-        """The sum (3,) [N] of the external forces at a frame; None where it depends on the deformation."""
-        cells, volume = self.body.mesh, float(tet_volumes(self.mesh.points, self.mesh.tets).sum())
-        forces = [
-            one.resultant(volume, lambda part: float(triangle_areas(cells.points, cells.facets[part]).sum()))
-            for one in self.effects
-        ]
-        known = [
-            one.amount(frame) * force for one, force in zip(self.effects, forces, strict=True) if force is not None
-        ]
-        return None if len(known) < len(forces) else np.sum(known, axis=0)
+    def load(self, frame: float, by: Floats | None = None, velocity: Floats | None = None) -> Wrench | None:
+        """The sum of the external loads at a frame, for displacement and velocity of nodes as in ``Displaced``; None where it is
+        not known from these alone. Without displacements its moment is NaN.
+        """
+        shape = Displaced(replace(self.mesh, facets=self.body.mesh.facets), by, velocity)
+        acting = [(one.amount(frame), one.resultant(shape)) for one in self.effects]
+        known = [Wrench(amount * one.force, amount * one.moment) for amount, one in acting if one is not None]
+        return None if len(known) < len(acting) else total(known)
 
     def write_meshes(self, folder: Path) -> None:
         """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
