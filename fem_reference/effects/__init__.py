@@ -143,6 +143,18 @@ class VolumeLaw(Energy):
         return Moduli(bulk=self.bulk)
 
 
+class PassiveFibres(Energy):
+    """An energy of fibres that resist stretch."""
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """The tension of the fibres at the greatest expected stretch, against the matrix."""
+        greatest = scene.stretch[1]
+        pull = fibre_tension(self, greatest)
+        return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
+
+
 class Load(Effect):
     """A load on the part ``on`` of the surface."""
 
@@ -188,13 +200,6 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     state = elastic_state(acting, state)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
     return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
-
-
-def passive_tension(effect: Energy, scene: Estimates) -> Indicator:
-    """The tension of passive fibres at the greatest expected stretch, against the matrix."""
-    greatest = scene.stretch[1]
-    pull = fibre_tension(effect, greatest)
-    return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:

@@ -4,13 +4,12 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, Moduli, State, passive_tension
-from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.effects import Moduli, PassiveFibres, State
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
 
-class FibrePassive(Energy):
+class FibrePassive(PassiveFibres):
     """``dW/dl = stress f(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``f = 0`` up to 1,
     ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the line that goes on from there.
 
@@ -22,7 +21,6 @@ class FibrePassive(Energy):
     data of longer fibres stands behind this law. Slack fibres are without limit.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("fibre",)
     example: ClassVar[dict[str, Any]] = {
         "stress": "300 kPa",
         "p1": 0.05,
@@ -39,10 +37,6 @@ class FibrePassive(Energy):
     def limits(self) -> tuple[Limit, ...]:
         """The range of the fibre stretch."""
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
-
-    def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        return passive_tension(self, scene)
 
     def moduli(self) -> Moduli:
         """The stiffness that it gives the body at rest."""

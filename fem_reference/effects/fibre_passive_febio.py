@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fem_reference.effects import Energy, State, passive_tension
-from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.effects import PassiveFibres, State
 from fem_reference.foundations.units import PositivePressure
 
 # On (0, 1), as Python floats: numpy numbers would turn symbols into arrays.
@@ -14,7 +13,7 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=True))
 
 
-class FibrePassiveFebio(Energy):
+class FibrePassiveFebio(PassiveFibres):
     """``l dW/dl = 0`` up to an isochoric fibre stretch ``l`` of 1, ``c3 (exp(c4 (l - 1)) - 1)`` up to ``linear_from``, and beyond
     it ``c5 l + c6``, where c6 makes it continuous.
 
@@ -23,16 +22,11 @@ class FibrePassiveFebio(Energy):
     rule: its error is below 1e-12 c3 while ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("fibre",)
     example: ClassVar[dict[str, Any]] = {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3}
     c3: PositivePressure
     c4: float = Field(gt=0)
     c5: PositivePressure
     linear_from: float = Field(gt=1)
-
-    def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        return passive_tension(self, scene)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

@@ -8,7 +8,6 @@ from typing import Literal, get_args
 from fem_reference.export import febio, febio_contact, open_formats, texts
 from fem_reference.export.folders import check, new_folder
 from fem_reference.foundations.errors import InputError
-from fem_reference.io import files
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -16,6 +15,11 @@ log = logging.getLogger(__name__)
 
 Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
+_FEBIO_FILES = """\
+| `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
+| `tet10.csv` | the ten nodes of each of its elements, in the order of FEBio |
+"""
+_NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the muscle at rest"
 
 
 def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, form: Format) -> list[str]:
@@ -38,11 +42,11 @@ def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, f
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format) -> None:
     open_formats.write(case, problem, folder)
-    files.write_text(folder / "candidate.toml", texts.candidate())
+    texts.write(folder / "candidate.toml", case)
+    texts.write(folder / "README.md", case, more=_FEBIO_FILES if form == "febio" else "")
     if form == "febio":
         differences = febio_contact.notes(problem)
         for difference in differences:
             log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)
-        files.write_text(folder / "FEBIO.md", texts.febio_readme(case, differences))
-    files.write_text(folder / "README.md", texts.readme(case, febio=form == "febio"))
+        texts.write(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))

@@ -77,8 +77,8 @@ def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
     """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
-        | {"file": name, "obstacle": obstacle}
-        for entry, name, obstacle in zip(case.bone, bone_files(problem), _are_obstacles(problem), strict=True)
+        | {"file": name, "obstacle": bone in problem.obstacles}
+        for entry, name, bone in zip(case.bone, bone_files(problem), problem.bones, strict=True)
     ]
     return {
         "case": case.name,
@@ -96,11 +96,6 @@ def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in problem.effects],
         "mesh": problem.mesh_facts,
     }
-
-
-def _are_obstacles(problem: MuscleProblem) -> list[bool]:
-    contact = problem.contact
-    return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
 
 
 def _effect(effect: Effect) -> dict[str, Any]:

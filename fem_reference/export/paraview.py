@@ -33,6 +33,9 @@ from fem_reference.scenes import casefile
 log = logging.getLogger(__name__)
 
 INDEX = "runs.pvd"
+_NO_STATES = """
+The reference was solved without `reference.store_state = true`: the arrays that follow from its states are not here.
+"""
 # What is evaluated of states; displacement apart.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
@@ -55,7 +58,8 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
         files.write_pvd(part / INDEX, entries)
         forces.write_table(comparison, part / forces.FILE)
         unit = "frame numbers" if case.frames.interval is None else "seconds"
-        files.write_text(part / "README.md", texts.paraview_readme(case, unit, states=frames.results is not None))
+        lacking = _NO_STATES if frames.results is None else ""
+        texts.write(part / "README.md", case, "PARAVIEW.md", unit=unit, lacking=lacking)
         return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
 
 

@@ -135,13 +135,13 @@ def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None
     """VTP or VTK of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
     _format(path, f"one of {' '.join(vtk.LINES)}", vtk.LINES)
     with whole(path) as part:
-        vtk.write_lines(part, Polylines(positions, polylines.offsets), positions - polylines.points)
+        vtk.save(part, positions, polylines, positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
     with whole(path) as part:
-        vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
+        vtk.save(part, positions, mesh.tets, positions - mesh.points)
 
 
 def write_field(

@@ -216,13 +216,8 @@ def in_tables() -> tuple[str, ...]:
 
 def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
     """The units by ``metric.statistic``: of all metrics, or of those ``of`` these parts and ``against`` these standards."""
-    chosen = {name: metric(name) for name in names(against)}
-    return {
-        f"{name}.{statistic}": described.unit
-        for name, found in chosen.items()
-        if of is None or found.OF in of
-        for statistic, described in found.STATISTICS.items()
-    }
+    chosen = [name for name in names(against) if of is None or metric(name).OF in of]
+    return {f"{name}.{one}": each.unit for (name, one), each in described().items() if name in chosen}
 
 
 def of_itself(name: str) -> bool:

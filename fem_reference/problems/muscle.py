@@ -141,6 +141,11 @@ class MuscleProblem(Setup):
         known = [Wrench(amount * one.force, amount * one.moment) for amount, one in acting if one is not None]
         return None if len(known) < len(acting) else total(known)
 
+    @property
+    def obstacles(self) -> tuple[Bone, ...]:
+        """The bones in contact with the muscle."""
+        return tuple(bone for bone in self.bones if self.contact is not None and self.contact.is_by(bone.name))
+
     def write_meshes(self, folder: Path) -> None:
         """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
         files.write_surface(folder / "surface.vtp", self.surface, self.surface.points)

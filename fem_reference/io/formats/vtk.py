@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.soup import DataSet, Lines, Soup, joined, only_triangles
 
@@ -75,21 +75,11 @@ def _data(path: Path) -> DataSet:
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
     """The surface with point data ``displacement`` [mm], float64; as an unstructured grid in VTU."""
-    _save(path, surface.points, surface.triangles, displacement)
+    save(path, surface.points, surface.triangles, displacement)
 
 
-def write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
-    """The lines with point data ``displacement`` [mm], float64."""
-    _save(path, lines.points, lines, displacement)
-
-
-def write_tets(path: Path, mesh: TetMesh, displacement: Floats) -> None:
-    """VTU of the tets with point data ``displacement`` [mm], float64."""
-    _save(path, mesh.points, mesh.tets, displacement)
-
-
-def _save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells`` with the ``displacement`` (n, 3) [mm] of their points; OSError where that fails."""
+def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
+    """Write ``cells`` with point data ``displacement`` (n, 3) [mm], float64; OSError where that fails."""
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
