@@ -15,7 +15,7 @@ from fem_reference.problems.problem import Task
 from fem_reference.scenes.case import Candidate, Case, SolverChoice
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, trades
 
-__all__ = ["check", "choice", "find", "in_table", "names", "offers", "require", "settings", "takes_effects", "trades"]
+__all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings", "takes_effects", "trades"]
 
 
 def names(task: Task | None = None) -> list[str]:
@@ -77,11 +77,6 @@ def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
     for one in (*own, *table):
         return (one.name if own else name), one
     return name, SolverChoice(solver=name)
-
-
-def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:
-    """Raise MissingSoftware where the solver ``name`` needs software that is not installed."""
-    find(name, place, task).require(settings)
 
 
 def takes_effects(name: str) -> bool:

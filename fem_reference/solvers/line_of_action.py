@@ -19,7 +19,6 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.hill import HillSettings
 from fem_reference.solvers.common.lines import Lines, Passed, Via, lines_of
@@ -28,38 +27,21 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
-class SphereOn(CaseSphere):
-    """A sphere, given at rest, that moves with a ``bone``."""
-
-    bone: str
-
-
-class CylinderOn(Rod):
-    """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
-
-    bone: str
-
-
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``via_count``: so many points instead, evenly
-    spread over each fibre, each on the bone of the nearer end. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight path would cross it; ``obstacle``: several.
-    ``hill``: their forces.
+    spread over each fibre, each on the bone of the nearer end. ``obstacle``: what every part of a line goes around, from one
+    fixed point to the next, where the straight path would cross it. ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
     via_count: Annotated[int, Field(ge=0), Trade((0, 2, 4, 8))] = 0
-    sphere: SphereOn | None = None
-    cylinder: CylinderOn | None = None
     obstacle: tuple[ObstacleOn, ...] = ()
     hill: HillSettings | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.sphere is not None) + (self.cylinder is not None) + bool(self.obstacle) > 1:
-            raise ValueError('at most one of "sphere", "cylinder", "obstacle"')
         if self.via and self.via_count:
             raise ValueError('at most one of "via", "via_count"')
         places = [via.at for via in self.via]
@@ -138,15 +120,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     obstacle at the first frame.
     """
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
-    alone = [
-        ObstacleOn(**{"bone": one.bone, name: one})
-        for name in ("sphere", "cylinder")
-        if (one := getattr(settings, name))
-    ]
-    names = [join(place, one.name) for one in alone] or [
-        join(place, f"obstacle[{i}]") for i in range(len(settings.obstacle))
-    ]
-    wraps = wraps_of(problem, (*alone, *settings.obstacle), names)
+    wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)
     if inside:
         raise InputError(join(place, name), inside, "an obstacle with all of them outside")

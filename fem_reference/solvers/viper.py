@@ -14,7 +14,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy.sparse import csr_array
+from scipy.sparse import block_diag, csr_array
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -22,7 +22,6 @@ from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import carry, follow
@@ -117,21 +116,15 @@ class Rods:
         self.surface, self.fibres = (problem.begin(points) for points in (problem.surface.points, fibres.points))
         self.of_surface = shares(problem.surface.points, rest.reshape(-1, 3), _CARRIERS)
         self.of_fibres = _along_rods(lines, settings.points)
-        self.bones, self.skin_bones = self._bones(), list[CollidingBone]()
+        self.bones, self.skin_bones = list[CollidingBone](), list[CollidingBone]()
         if settings.contact:
-            at, attached = problem.surface.points, problem.attached_vertices
-            self.skin_bones = colliding_bones(problem.bones, at, attached, 0.0)
+            fixed = np.arange(rest[..., 0].size).reshape(rest.shape[:2])[:, [0, -1]].ravel()
+            self.bones = colliding_bones(problem.bones, rest.reshape(-1, 3), fixed, self.radius)
+            skin = problem.surface.points, problem.attached_vertices
+            self.skin_bones = colliding_bones(problem.bones, *skin, 0.0)
         self.check = SurfaceCheck(problem.surface, problem.attached_vertices)
         free = settings.points - 2
         self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free + 1) + 2))}
-
-    def _bones(self) -> list[CollidingBone]:
-        """The bones that rods stay out of."""
-        if not self.settings.contact:
-            return []
-        count, points = self.settings.points, self.rest.reshape(-1, 3)
-        ends = np.flatnonzero(np.arange(len(points)) % count % (count - 1) == 0)
-        return colliding_bones(self.problem.bones, points, ends, self.radius)
 
     def move(self, number: int) -> None:
         """Find the rods at a frame, and the surface and fibres that follow them."""
@@ -150,21 +143,19 @@ class Rods:
         self.points = (1 - share) * first[0] + share * last[0]
         self.turns = unit((1 - between) * first[1] + between * last[1])
         for ends, i in zip(self.ends, (0, -1), strict=True):
-            self.points[:, i] = [apply(self._bone(n).pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
+            self.points[:, i] = [apply(self.problem.bones[n].pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
         """Points and turns as if each rod were fixed to the bones ``ends`` (k,) of one end since the frame before ``number``."""
         points, turns = np.empty_like(self.points), np.empty_like(self.turns)
         for n in np.unique(ends):
-            step = self._bone(n).pose(number) @ np.linalg.inv(self._bone(n).pose(self.last))
+            bone = self.problem.bones[n]
+            step = bone.pose(number) @ np.linalg.inv(bone.pose(self.last))
             quaternion = Rotation.from_matrix(step[:3, :3]).as_quat(canonical=True, scalar_first=True)
             points[ends == n] = apply(step, self.points[ends == n].reshape(-1, 3)).reshape(-1, *points.shape[1:])
             turns[ends == n] = product(quaternion, self.turns[ends == n])
         return points, turns
-
-    def _bone(self, index: int) -> Bone:
-        return self.problem.bones[index]
 
     def _sweep(self) -> None:
         """Project all constraints once."""
@@ -224,18 +215,12 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
 
 def _along_rods(lines: list[Floats], count: int) -> csr_array:
     """The shares (n, k * count) of points of rods in the points of ``lines``: of the two ends of the segment that each is on."""
-    rows, columns, weights, done = list[Ints](), list[Ints](), list[Floats](), 0
-    for rod, line in enumerate(lines):
+    shares_of = []
+    for line in lines:
         travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        at = travelled / travelled[-1] * (count - 1)
-        low = np.minimum(at.astype(np.int64), count - 2)
-        rows += 2 * [done + np.arange(len(line))]
-        columns += [rod * count + low, rod * count + low + 1]
-        weights += [1 - (at - low), at - low]
-        done += len(line)
-    parts = (np.concatenate(part) for part in (weights, rows, columns))
-    values, row, column = parts
-    return csr_array((values, (row, column)), shape=(done, len(lines) * count))
+        places, ends = travelled / travelled[-1] * (count - 1), np.arange(count)
+        shares_of.append(csr_array(np.column_stack([np.interp(places, ends, hat) for hat in np.eye(count)])))
+    return csr_array(block_diag(shares_of))
 
 
 def _carried(rest: Floats, parts: Floats) -> Floats:

@@ -103,7 +103,10 @@ class XpbdConstraints:
         # The compiled functions know writable arrays only.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        slender = distances(points, hinges) ** 2 / pair_areas(points, hinges)
+        areas = triangle_areas(points, hinges[:, [0, 1, 2]]) + triangle_areas(
+            points, hinges[:, [0, 1, 3]]
+        )  # of both triangles
+        slender = distances(points, hinges) ** 2 / areas
         stretched, bent, filled = (
             slice(None if stiffness else 0) for stiffness in (settings.stretch, settings.bending, settings.volume)
         )
@@ -138,11 +141,6 @@ def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
     found = 1 / mass
     found[attached] = 0
     return np.asarray(found)
-
-
-def pair_areas(points: Floats, hinges: Ints) -> Floats:
-    """Area (h,) [mm2] of both triangles of each of the ``hinges`` (h, 4)."""
-    return triangle_areas(points, hinges[:, [0, 1, 2]]) + triangle_areas(points, hinges[:, [0, 1, 3]])
 
 
 class BoneContact:

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -110,8 +110,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
     return cost
 
 
-def timed[M: FrameModel, P: Setup, S: Record](
-    make: Callable[[P, S], M], setup: P, settings: S, quick: S | None = None
+def timed[M: FrameModel, S: Record](
+    make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
     """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. First it solves one
     frame of a tetrahedron, with ``quick`` settings where there are some: this calls every compiled function, in

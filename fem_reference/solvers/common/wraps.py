@@ -83,11 +83,10 @@ class ObstacleOn(Record):
 
 @dataclass(frozen=True, eq=False)
 class Wraps:
-    """The obstacles ``given`` on ``bones`` and their ``surfaces`` at rest; a sphere or a cylinder alone has a closed form."""
+    """The obstacles ``given`` on ``bones``; a sphere or a cylinder alone has a closed form."""
 
     given: tuple[ObstacleOn, ...]
     bones: tuple[Bone, ...]
-    surfaces: tuple[Quadric | Ring, ...]
 
     def around(self, fixed: Floats, number: int) -> Paths | Winding:
         """The shortest paths of all parts of lines through the points ``fixed`` (k, q + 1, 3), line by line, at a frame."""
@@ -100,12 +99,12 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The obstacle with the deepest fixed point inside, its depth and its line, in words; empty where none is inside."""
+        """The key of the obstacle with the deepest fixed point inside, its depth and its line, in words; empty where none is inside."""
         found = []
-        for one, surface in zip(self.given, self._moved(number), strict=True):
+        for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)
             depths = np.linalg.norm(surface.pushed(points) - points, axis=1).reshape(len(fixed), -1).max(axis=1)
-            found.append((float(depths.max()), int(depths.argmax()), one.name))
+            found.append((float(depths.max()), int(depths.argmax()), f"obstacle[{i}]"))
         depth, line, name = max(found, default=(0.0, 0, ""))
         return (name, f"a fixed point of line {line} {depth:.3g} mm inside") if depth > _TOUCHES else ("", "")
 
@@ -113,14 +112,13 @@ class Wraps:
         return " and ".join(f"the {one.name} on {one.bone}" for one in self.given)
 
     def _moved(self, number: int) -> list[Quadric | Ring]:
-        return [one.moved(bone.pose(number)) for one, bone in zip(self.surfaces, self.bones, strict=True)]
+        return [one.surface().moved(bone.pose(number)) for one, bone in zip(self.given, self.bones, strict=True)]
 
 
-def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], places: list[str]) -> Wraps:
-    """The obstacles of a muscle; InputError at one of ``places`` where there is no such bone."""
-    pairs = zip(given, places, strict=True)
-    bones = tuple(problem.bones[index(problem.bones, one.bone, join(place, "bone"))] for one, place in pairs)
-    return Wraps(given, bones, tuple(one.surface() for one in given))
+def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], place: str) -> Wraps:
+    """The obstacles of a muscle; InputError below ``place`` where there is no such bone."""
+    bones = [index(problem.bones, one.bone, join(place, f"obstacle[{i}].bone")) for i, one in enumerate(given)]
+    return Wraps(given, tuple(problem.bones[i] for i in bones))
 
 
 def _pose(turn: Rotation, centre: tuple[float, float, float]) -> Floats:

@@ -25,15 +25,7 @@ from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, Muscl
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept
 from fem_reference.solvers.fenicsx.processes import command_line, mpiexec, require_installed
-from fem_reference.solvers.fenicsx.session import (
-    opened,
-    session,
-    shared,
-    solve_body,
-    solve_field,
-    solve_on,
-    solve_scalar,
-)
+from fem_reference.solvers.fenicsx.session import opened, session, shared, solve_body, solve_on, solve_scalar
 from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings, Settings
 
 log = logging.getLogger(__name__)
@@ -223,3 +215,4 @@ SOLVES = (
     FieldSolver(settings=FieldSettings, solve=solve_scalar, example={}, require=require, slow=True),
     BodySolver(settings=BodySettings, solve=solve_on, example={}, require=require, slow=True),
 )
+solve_field = SOLVES[1].run  # in memory

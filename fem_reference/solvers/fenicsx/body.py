@@ -23,8 +23,8 @@ from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, Pres
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolver
-from fem_reference.solvers.fenicsx.multigrid import Multigrid
+from fem_reference.solvers.fenicsx.linear import Factorised
+from fem_reference.solvers.fenicsx.multigrid import LinearSolver, Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
@@ -46,7 +46,9 @@ class AssembledBody:
         self.conserves = not any(map(_is_changed_from_outside, self.effects))
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        self.cells = meshes.own_cells(self.mesh)
+        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[
+            : self.mesh.topology.index_map(3).size_local
+        ]
         self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)

@@ -25,11 +25,6 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
     )
 
 
-def own_cells(msh: mesh.Mesh) -> Ints:
-    """The cells (m,) of the body's mesh that are this rank's own, in the rank's order."""
-    return np.asarray(msh.topology.original_cell_index, np.int64)[: msh.topology.index_map(3).size_local]
-
-
 def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
     """This rank's facets of each region, whose facets (f, k) are given by their corners, points of the original mesh."""
     topology, facet = msh.topology, msh.topology.dim - 1

@@ -14,7 +14,6 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.checks import check
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
-from fem_reference.solvers.common.protocol import solved
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import Process, command_line, installed, require_installed
 from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
@@ -122,8 +121,3 @@ def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> 
     lost = Frame.of_field(problem, np.full(len(problem.fixed), np.nan), problem.form)
     sink(frames[0] if frames else lost)
     return outcome
-
-
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Run:
-    """The run of a scalar field, in memory."""
-    return solved(solve_scalar, problem, settings)

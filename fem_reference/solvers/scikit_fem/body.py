@@ -14,9 +14,9 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.checks import check
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march
-from fem_reference.solvers.common.protocol import Trade, solved
+from fem_reference.solvers.common.protocol import Trade
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.scikit_fem.equations import Equations
 
@@ -77,11 +77,6 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
         sink(march_of.state(step))
         log.debug("frame %g: %d Newton iterations", step.frame, step.iterations)
     return Outcome("converged", f"all {len(body.frames)} frames reached", cost())
-
-
-def solve_body(body: Body, settings: ScikitBodySettings) -> Run:
-    """The run of ``body``, in memory."""
-    return solved(solve, body, settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import FieldProblem, at
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
-from fem_reference.solvers.common.protocol import solved
+from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above leave no correct digit
@@ -103,11 +102,6 @@ def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> O
     values, outcome = _solved(problem)
     sink(Frame.of_field(problem, values, problem.form))
     return outcome
-
-
-def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Run:
-    """The run of a scalar field, in memory."""
-    return solved(solve, problem, settings)
 
 
 def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:

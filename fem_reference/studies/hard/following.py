@@ -57,7 +57,7 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         raise InputError(solver, f"{len(muscle.mesh.tets)} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
     solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
-    solvers.require(solver, settings, solver, task)
+    solvers.find(solver, solver, task).require(settings)
     frames = list[Frame]()
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)
     check_not_stalled(outcome)

@@ -26,7 +26,7 @@ def given() -> MuscleProblem:
 
 def wraps(given: MuscleProblem, *obstacles: dict) -> Wraps:
     made = tuple(parse(ObstacleOn, one, "obstacle") for one in obstacles)
-    return wraps_of(given, made, [f"obstacle[{i}]" for i in range(len(made))])
+    return wraps_of(given, made, "")
 
 
 FIXED = np.array([[[5.0, 4, 0], [6, 4, 30]], [[4.0, 6, 1], [5, 5.5, 29]], [[14.0, 6, 1], [15, 6, 29]]])
@@ -58,11 +58,11 @@ def test_what_is_deepest_inside_is_named(given) -> None:
     fixed = FIXED.copy()
     fixed[1, 1] = [11, 5, 16.5]
     name, message = wraps(given, BALL, RING).inside(fixed, 0)
-    assert name == "torus"
+    assert name == "obstacle[1]"
     assert message.startswith("a fixed point of line 1 ")
     assert wraps(given, BALL, RING).inside(FIXED, 0) == ("", "")
     fixed[1, 1] = [5, 5, 18]
-    assert wraps(given, BALL, RING).inside(fixed, 0) == ("sphere", "a fixed point of line 1 1 mm inside")
+    assert wraps(given, BALL, RING).inside(fixed, 0) == ("obstacle[0]", "a fixed point of line 1 1 mm inside")
 
 
 def test_what_an_obstacle_is_moved_to_is_inside(given) -> None:
