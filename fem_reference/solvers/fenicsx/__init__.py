@@ -18,7 +18,9 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import vector_scalars
+from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.stress_statistics import stress_scalars
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
@@ -83,7 +85,8 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
 
     def pass_on(frame: Frame) -> None:  # those of the relaxation before the first requested frame are dropped
         if frame.number in problem.frames:
-            sink(_described(problem, frame, is_first=not passed))
+            described = _described(problem, frame, is_first=not passed)
+            sink(described if chosen.store_state else replace(described, state=None))
             passed.append(frame.number)
 
     with opened(chosen.ranks or 1) as solver:
@@ -98,7 +101,9 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
 
 
 def _described(problem: MuscleProblem, frame: Frame, *, is_first: bool) -> Frame:
-    """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle."""
+    """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle, and its
+    stresses.
+    """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
     note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {smallest:.2g}"
@@ -112,7 +117,16 @@ def _described(problem: MuscleProblem, frame: Frame, *, is_first: bool) -> Frame
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    return replace(frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame))
+    return replace(
+        frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame) | _stresses(problem, frame)
+    )
+
+
+def _stresses(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
+    """The statistics of the stress [MPa]."""
+    assert frame.state is not None  # of a muscle
+    states = {frame.number: frame.state}
+    return stress_scalars(Results(problem.mesh, problem.effects, states, problem.directions), frame.number)
 
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
