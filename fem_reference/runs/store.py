@@ -49,7 +49,7 @@ class Frame:
     negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
     max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
     number of cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa]
-    and the contact_area at rest [mm2].
+    and the contact_area at rest [mm2]; of a muscle the stresses of ``stress_statistics``, as stress_von_mises_p95 [MPa].
     """
 
     number: float

@@ -141,12 +141,14 @@ def test_a_penalty_on_volume_change_is_a_pressure() -> None:
 
 
 def test_energies_of_effects_are_their_densities_times_the_volume() -> None:
-    """``mu/2 (l^2 + 2/l - 3)`` of incompressible neo-Hooke (Rivlin 1948); half of an effect with a ramp; a weight has none here."""
+    """``mu/2 (l^2 + 2/l - 3)`` of incompressible neo-Hooke (Rivlin 1948); half of an effect with a ramp; contact has none."""
     stretch, volume = 1.3, 4.0 * 6 * 8
     state = moved(affine(np.diag([stretch, stretch**-0.5, stretch**-0.5])))
     effects = (NEO_HOOKE, make("active_tension"), make("contact"))
     found = Results(MESH, effects, {30.0: state}, FIBRES).energies(30.0)
     assert set(found) == {"neo_hooke", "active_tension"}
+    along = np.sum((np.array([stretch, stretch**-0.5, stretch**-0.5]) * FIBRE) ** 2)
+    assert found["active_tension"] == pytest.approx(volume * 0.5 * 0.06 / 2 * (along - 1), rel=1e-12)
     assert found["neo_hooke"] == pytest.approx(volume * MU / 2 * (stretch**2 + 2 / stretch - 3), rel=1e-12)
     assert set(Results(MESH, (*MATRIX, NEO_HOOKE), {30.0: state}).energies(30.0)) == {"neo_hooke", "incompressible"}
     twice = Results(MESH, (NEO_HOOKE, NEO_HOOKE), {30.0: state}).energies(30.0)

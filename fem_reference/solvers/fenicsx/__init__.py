@@ -19,7 +19,9 @@ from fem_reference.geometry.quadratic import quadratic
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import vector_scalars
+from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.stress_statistics import stress_scalars
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
@@ -81,8 +83,7 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
             passed.append(frame.number)
 
     with opened(chosen.ranks or 1) as solver:
-        reporting = chosen.model_copy(update={"store_state": chosen.store_state or loads})
-        outcome = solver.run(Job(body, reporting, _samples(problem), kept), chosen.time_limit, pass_on)
+        outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = (
             "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given): "
@@ -107,7 +108,7 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     shape alone, without the solver's forms.
     """
     state = frame.state
-    assert state is not None  # requested where loads act
+    assert state is not None  # of a muscle
     by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
     load = problem.load(frame.number, by, None if since is None else state.rate * quadratic(since))
     assert load is not None  # as _are_known says
@@ -116,7 +117,7 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
 
 def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
     """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle, and its
-    ``loads``, where these are known.
+    ``loads``, where these are known, and its stresses.
     """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
@@ -132,7 +133,16 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    return replace(frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame))
+    return replace(
+        frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame) | _stresses(problem, frame)
+    )
+
+
+def _stresses(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
+    """The statistics of the stress [MPa]."""
+    assert frame.state is not None  # of a muscle
+    states = {frame.number: frame.state}
+    return stress_scalars(Results(problem.mesh, problem.effects, states, problem.directions), frame.number)
 
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
