@@ -1,8 +1,8 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
 
 A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
-space. By virtual work, where nothing is dissipated, the moment is minus the slope of the stored energy in the
-angle. Lines of action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
+space. By virtual work, where nothing is dissipated, the moment is minus the slope of the stored energy in the angle. Lines of
+action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
-sample fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres.
-Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is
-ignored. Contact acts on the masses of the surface only: the surface between them may be inside a bone.
+A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses sample
+fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres. Springs resist
+neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact acts on
+the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math

@@ -8,8 +8,8 @@ block turned by half a turn, through its planes of symmetry. That state is refus
 Where the bulk modulus is low, no state near the rest volume is left at some height. An isochoric neo-Hookean energy pulls at the
 volume, which the law ``K/2 (J - 1)^2`` cannot keep: its pressure is K at most. Free at its sides the block is in balance where
 ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. But for ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
-right side is 0.326 K at most, at J = 2/5. Below a stretch of some mu/K the only state left is near ``J = stretch^3``: a block
-that has shrunk equally along all axes, without shear and without force on the plate.
+right side is 0.326 K at most, at J = 2/5. Below a stretch of some mu/K the only state left is near ``J = stretch^3``: a block that
+has shrunk equally along all axes, without shear and without force on the plate.
 """
 
 from functools import partial

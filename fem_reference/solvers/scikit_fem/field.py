@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and
-areas within it); gradients are turned back into space.
+Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and areas
+within it); gradients are turned back into space.
 """
 
 import time
