@@ -58,7 +58,7 @@ def check(case: MuscleCase) -> None:
 
 
 def write(problem: MuscleProblem, folder: Path) -> None:
-    """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
+    """``scene.feb`` and, for readers of FEBio's nodes, ``tet10.csv`` into ``folder``."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)

@@ -23,7 +23,7 @@ def readme(case: MuscleCase, *, febio: bool) -> str:
 
 
 def febio_readme(case: MuscleCase, notes: Sequence[str]) -> str:
-    """Text on what of a case is the same in FEBio and what is not, with the ``notes`` on this one."""
+    """Text on similarities and differences of cases in FEBio, with the ``notes`` on this one."""
     here = (
         "".join(f"- {note}\n" for note in notes)
         or "- no springs at points of the surface, no bone that overlaps the muscle at rest\n"

@@ -51,8 +51,8 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 def force_arms(run: Run, joint: Joint) -> Floats:
     """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN where there is none.
 
-    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, virtual work
-    makes it the mean of ``-dl/dtheta`` of what pulls, each with its share of the resultant.
+    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, by virtual
+    work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
     """
     moment, force = _values(run, joint)
     known = force > _LEAST * force.max(initial=0.0)

@@ -1,4 +1,4 @@
-"""A scalar case as frozen records: where a field lives, which effects act on it, its boundary conditions, and what is expected."""
+"""A scalar case as frozen records: the domain of its field, its effects, its boundary conditions and its expectations."""
 
 from itertools import pairwise
 from typing import Literal, Self

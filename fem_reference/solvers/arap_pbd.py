@@ -43,7 +43,7 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
+    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
     states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off

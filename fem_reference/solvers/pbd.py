@@ -71,7 +71,7 @@ class PbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class PbdConstraints:
-    """The constraints of a surface: what it keeps of its rest state.
+    """The constraints that keep a surface at its rest state.
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each

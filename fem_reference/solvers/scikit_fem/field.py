@@ -33,7 +33,7 @@ _ELEMENTS = {
 
 
 class ScikitFieldSettings(Record):
-    """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
+    """``form``: that of the ``scene``, or always plain ``galerkin``, to show the effect of stabilisation."""
 
     form: Literal["scene", "galerkin"] = "scene"
 
@@ -70,7 +70,7 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right side (N,) of the weak form, without what is fixed; nodes in the order of the problem."""
+    """Matrix (N, N) and right side (N,) of the weak form, without fixed values; nodes in the order of the problem."""
     basis, laid = space(problem)
     place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
 
