@@ -1,4 +1,4 @@
-"""Contact with bones and springs of attachments in FEBio's input file, and what is another model there.
+"""Contact with bones and springs of attachments in FEBio's input file, and the differences of the model there.
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
 second that was nearest at rest. It integrates over the first surface as that is now: a rigid copy of the area attached, which keeps

@@ -65,7 +65,7 @@ def has_force(run: Run, bone: Bone) -> bool:
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
     """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0: on its central axis, about which no moment
-    is left but that along the force, nearest to the middle of what is attached to the bone; of what is not, to the origin.
+    is left but that along the force, nearest to the middle of its attachment; of a bone without one, to the origin.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)

@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Floats
 class Jet:
     """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,).
 
-    Along the points, a slope or curvature that is the same at all has length 1; what a jet is combined with has as many axes as
+    Along the points, a slope or curvature that is the same at all has length 1; values combined with a jet have as many axes as
     its points, or none.
     """
 

@@ -90,7 +90,7 @@ def _own(errors: Sequence[Any]) -> list[Any]:
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error that says all that is ``wrong``, the first at length; what is wrong with one key is said once."""
+    """One error that says all that is ``wrong``, the first at length; each key once."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:

@@ -83,7 +83,7 @@ def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Po
 
 
 def read_points(path: Path) -> Floats:
-    """The points (n, 3) of a VTK file, whatever its cells."""
+    """The points (n, 3) of a VTK file with cells of any kind."""
     return np.asarray(_attempt(vtk.read_points, path, "a VTK file, whole"), float)
 
 

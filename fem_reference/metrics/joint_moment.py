@@ -1,8 +1,8 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
 
 A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
-space. By virtual work, where nothing is dissipated, the moment is minus the slope of the stored energy in the
-angle. Lines of action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
+space. By virtual work, where nothing is dissipated, the moment is minus the slope of the stored energy in the angle. Lines of
+action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
 
 The arm is not that of the fibres' excursion: a matrix that is bent bears a moment with little force (docs/measures.md).
 """
@@ -64,8 +64,8 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 def force_arms(run: Run, joint: Joint) -> Floats:
     """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN where there is none.
 
-    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, virtual work
-    makes it the mean of ``-dl/dtheta`` of what pulls, each with its share of the resultant.
+    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, by virtual
+    work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
     """
     return np.asarray(_values(run, joint)[2])
 

@@ -4,9 +4,9 @@ Between two stops no bone and no prescribed region turns by more than a right an
 line between two poses loses the direction), moves farther than the size of the body, apart from the motion that all share,
 or moves there and back by more than a fifteenth of that distance and a hundredth of the body's size.
 
-Motions and paths of this package state the frames at which they bend and the angles by which they turn between
-(``turning``), so that this holds for all of them. Any other function of a frame number is sampled 1024 times over all
-frames, at least 16 times between two of them, and again where it moves far: faster motion is not seen.
+Motions and paths of this package state the frames at which they bend and the angles by which they turn between (``turning``), so
+that this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times
+between two of them, and again where it moves far: faster motion is not seen.
 """
 
 from collections.abc import Callable, Sequence

@@ -37,7 +37,7 @@ def first_piola(acting: Acting, state: State, count: int) -> Floats:
 
 def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
     """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of what is ``acting`` at deformation gradients ``F`` (n, 3, 3) with
-    fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without what time makes.
+    fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without effects of time.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
@@ -111,9 +111,10 @@ def _mean(stress: Floats, volumes: Floats) -> float:
 class Watch:
     """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
 
-    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
-    act. While a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the
-    greatest there was. ``frames``: the surface (n, 3) of each, and the stresses in its tetrahedra, where there are any.
+       From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
+           act. While a run is made, the latter is the ``known`` estimate or, where greater, the stress found so far; at its
+       end, the greatest found.
+    ``frames``: the surface (n, 3) of each, and the stresses in its tetrahedra, where there are any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

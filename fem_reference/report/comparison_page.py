@@ -92,7 +92,7 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
 
 def headlines(comparison: Comparison) -> Headlines:
     """The verdict on each candidate, "not judged" where nothing is expected of it, with its greatest deviations; then the
-    reference's own checks, and what makes it doubtful.
+    reference's own checks and doubts.
     """
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:

@@ -45,7 +45,7 @@ def _columns(found: Estimation) -> dict[str, Statistic]:
 
 
 def said(found: Estimation) -> str:
-    """The best technique for fibres, and what Gaussians give."""
+    """The best technique for fibres, and the accuracy of Gaussians, in sentences."""
     by_technique = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
     best = min(by_technique, key=lambda name: float(by_technique[name]))
     most = max(one.gaussians for one in found.fits)

@@ -124,7 +124,7 @@ def seconds(run: Run) -> float | None:
 
 
 def form(example: Comparison, run: Run) -> str:
-    """The weak form that was solved: what the run says, else that of the problem."""
+    """The weak form that was solved: that of the run, else that of the problem."""
     return str(run.origin.get("form", example.setup.form))
 
 

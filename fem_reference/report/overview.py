@@ -1,4 +1,4 @@
-"""A case and its results as lines of text: what ``show``, ``run`` and ``compare`` print."""
+"""A case and its results as lines of text, for the verbs ``show``, ``run`` and ``compare``."""
 
 import math
 from collections.abc import Iterable

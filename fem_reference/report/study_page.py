@@ -98,7 +98,7 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
-    """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
+    """Tables at the same time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
     # What "at most" means of an error here is what it means to the verb recommend.
     asked.append((case.certain, TIME, error, TIME))

@@ -24,7 +24,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
-    forces and inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest``
+    forces and inversion numbers that its solver recorded; ``doubts`` the reasons to doubt the reference, in words; ``from_rest``
     the change from rest of every run, with its forces; ``error_bars`` the error bars of the reference and ``rankings`` the solvers
     that they separate, both empty without bars.
     """

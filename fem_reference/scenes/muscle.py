@@ -254,7 +254,7 @@ class MuscleCase(Case):
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by what each is called beside the others."""
+        """The effects by their names, distinct in this case."""
         return {effect.title: effect for effect in self.effects}
 
     @property

@@ -1,11 +1,11 @@
 """ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
-*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve
-``L p' = b + lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the
-positions of the iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's:
-no small change that keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths,
-volume, dihedral angles) start from the ARAP state of the frame; there are no velocities. Where both are requested, the
-projections come last. As in ``arap``, there is no contact.
+*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve ``L p' = b +
+lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the positions of the
+iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's: no small change that
+keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles)
+start from the ARAP state of the frame; there are no velocities. Where both are requested, the projections come last. As in
+``arap``, there is no contact.
 """
 
 from typing import Annotated, Self
@@ -43,7 +43,7 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
+    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
     states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off

@@ -1,10 +1,10 @@
 """Bones that keep vertices out of them, as constraints ``C = distance - allowed >= 0`` of vertices. Report section 6.1.1.
 
-The distance to a bone is computed only for the vertices that may be near it. A distance changes by at most the displacement, so
-a vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at
-the places that they reach and not on the path there: a sharp edge may pass between them, and a vertex that goes through a thin
-bone in one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest: with
-the whole scene turned, ``pbd`` moves the vertices of the case hip_flexion by up to 1.2 mm, on average by 0.1 mm.
+The distance to a bone is computed only for the vertices that may be near it. A distance changes by at most the displacement, so a
+vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at the
+places that they reach and not on the path there: a sharp edge may pass between them, and a vertex that goes through a thin bone in
+one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest: with the
+whole scene turned, ``pbd`` moves the vertices of the case hip_flexion by up to 1.2 mm, on average by 0.1 mm.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
 Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest. Between two fixed
-points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
-line goes around an obstacle on the shorter side: where its ends turn beyond opposite points, it changes sides.
+points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A line
+goes around an obstacle on the shorter side: where its ends turn beyond opposite points, it changes sides.
 """
 
 from typing import Annotated, Self

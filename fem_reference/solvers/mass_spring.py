@@ -1,9 +1,9 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
-sample fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres.
-Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is
-ignored. Contact acts on the masses of the surface only: the surface between them may be inside a bone.
+A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses sample
+fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres. Springs resist
+neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact acts on
+the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math
@@ -52,7 +52,7 @@ class MassSpringSettings(Record):
     ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
     not depend on them, and a small one would make every time step small.
     ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
-    equilibrium; the scene's interval is the clock of what the reference and recorded sequences do in time. ``damping``: the
+    equilibrium; the scene's interval is that of the reference and of recorded sequences. ``damping``: the
     coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
     ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
     ``time_step``: the longest step wanted; without it one that is stable.
@@ -135,7 +135,7 @@ class MassSpringModel:
 
     @property
     def advice(self) -> str:
-        """Advice: a stable time step, else what brings the masses to rest."""
+        """Advice: a stable time step, else settings that bring the masses to rest."""
         limit = stable_time_step(self.network, self.fixed)
         if self.time_step > limit:
             return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"

@@ -1,10 +1,10 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
-Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
-sub-iteration is a full step of the algorithm. No external force acts, so the time step cancels: in place of velocities
-the displacements of vertices in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the
-result depends on the order of the vertices, since constraints are projected one after the other. Collisions are found anew
-in every sweep; line 13 finds them once.
+Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every sub-iteration is a
+full step of the algorithm. No external force acts, so the time step cancels: in place of velocities the displacements of vertices
+in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the result depends on the order of
+the vertices, since constraints are projected one after the other. Collisions are found anew in every sweep; line 13 finds them
+once.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ class PbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class PbdConstraints:
-    """The constraints of a surface: what it keeps of its rest state.
+    """The constraints that keep a surface at its rest state.
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each

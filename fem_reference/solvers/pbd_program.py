@@ -21,12 +21,11 @@ The program (github.com/cervenkam/muscle-deformation-PBD) departs from the repor
 
 Frame number n is the state after iteration n.
 
-The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. That requires the
-program's own order of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and
-a difference of 1e-15 at rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc
-with the flags that come with it, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma
-the result differs by iteration 50). For the same reason a bone's pose is here the product of its motions, and the angle of
-flat pairs at rest is off by 2e-8 rad.
+The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. That requires the program's own
+order of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at
+rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the flags that come with
+it, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration
+50). For the same reason a bone's pose is here the product of its motions, and the angle of flat pairs at rest is off by 2e-8 rad.
 
 Two things differ from the program: the scene defines the attached vertices (there: all vertices in the voxels of a bone at rest),
 and fibres have their own direction (there: one between points that are not all theirs).

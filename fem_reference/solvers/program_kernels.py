@@ -67,7 +67,7 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
-    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of what is missing."""
+    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of the missing volume."""
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):

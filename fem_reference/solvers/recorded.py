@@ -105,7 +105,7 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Every frame wanted, once all of them are read and known to be of this surface; the cost is what ``candidate.toml`` says.
+    """Every frame wanted, once all of them are read and known to be of this surface; the cost is that of ``candidate.toml``.
 
     The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
     """

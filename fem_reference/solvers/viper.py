@@ -6,8 +6,8 @@ stretched. The rods of a bundle are tied by shape matching with a scale, which i
 
 Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is neither
 mass nor time: a frame number begins with the state before, moved by a blend of the bones. Stiffnesses are shares of an error, as
-in ``pbd``, so the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
-volume. Only rods keep their volume; the surface that they carry may not.
+in ``pbd``, so the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's volume.
+Only rods keep their volume; the surface that they carry may not.
 """
 
 from typing import Annotated

@@ -52,8 +52,8 @@ class XpbdCollision(Record):
 class XpbdSettings(Record):
     """The settings of the method and of the muscle; every key is required but those that turn an effect on.
 
-    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is the clock of what the
-    reference and recorded sequences do in time. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
+    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of
+    the reference and of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
     step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
 
     ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``

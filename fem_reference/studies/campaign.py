@@ -1,7 +1,7 @@
 """Many runs at once: on processes of this machine, or on the workers of a Dask cluster; each run goes into the store.
 
-If a worker dies, only the run that it was solving is lost; another worker solves it again. Stored runs are
-not solved again, so an interrupted campaign continues where it stopped.
+If a worker dies, only the run that it was solving is lost; another worker solves it again. Stored runs are not solved again, so an
+interrupted campaign continues where it stopped.
 """
 
 import logging

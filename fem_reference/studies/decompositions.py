@@ -1,5 +1,5 @@
 """Decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings, and
-what the reference answers with each.
+the answer of the reference with each.
 """
 
 import logging

@@ -60,7 +60,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
     moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones.
-    InputError names the file that cannot be used, or what cannot be guessed.
+    InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more: a muscle goes from one to another")

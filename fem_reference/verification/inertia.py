@@ -51,8 +51,8 @@ def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: i
 
 
 def frequency(lab: Lab, steps: int, factor: float) -> float:
-    """The frequency of the first mode of a bar [rad/s] under a small weight along it, in so many steps a period, over two of them:
-    of any cosine of n steps about a mean, q, ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, c the cosine of what one step turns.
+    """The frequency of the first mode of a bar [rad/s] under a small weight along it, by ``steps`` a period over two periods: a
+    cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, with c the cosine of the phase of one step.
     """
     acting = mass(factor), weight(0, 1e-4 * MODULUS / DENSITY / LENGTH)
     solved = lab.solve(bar(acting, (), 2 * steps, 2 * PERIOD), "P2", **STEP, residual=1e-14)
@@ -89,7 +89,7 @@ PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FR
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
-    """The force [N] that inertia adds at a quarter of a pull of so many ``periods`` of the first mode, of 1e-4 of the length."""
+    """The force [N] of inertia after a quarter of a pull by 1e-4 of the length in so many ``periods`` of the first mode."""
     forces = []
     for acting in ((), (mass(factor),)):
         body = bar(acting, (Prescribed("x1", "x1", (0,), PULL),), FRAMES, periods * PERIOD)

@@ -1,8 +1,8 @@
 """The same bodies by other solvers: by scikit-fem, and by each linear solver of FEniCSx, which must not change the answer.
 
 FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Both discretise alike, so that their states differ
-by Newton's residual and, where a rule cannot integrate an energy exactly, by their rules: Gauss-Legendre in hexahedra for both, but
-other points in tetrahedra, where a higher degree brings them together.
+by Newton's residual and, where a rule cannot integrate an energy exactly, by their rules: Gauss-Legendre in hexahedra for both,
+but other points in tetrahedra, where a higher degree brings them together.
 """
 
 from collections.abc import Callable

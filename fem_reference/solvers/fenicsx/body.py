@@ -246,8 +246,8 @@ class AssembledBody:
         """The number of directions in which the energy falls from the present state, which is that of ``frame``; None where the
         tangent is not symmetric. The state is kept for later frames with the same loads.
 
-        With drag or viscosity a direction counts if the energy falls along it by more than a factor e over all frames, with the
-        body attached still from now on: the viscous stress of this step is left out.
+        With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames,
+        with the bones at rest from now on: the viscous stress of this step is left out.
         """
         if self.recalled is not None:
             self.modes = self.recalled.negative_modes

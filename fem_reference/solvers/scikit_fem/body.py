@@ -156,7 +156,7 @@ class March:
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
-        """The equations after as much of ``step`` as leaves the forces on ``free`` unknowns below ``limit``."""
+        """The equations after ``step``, shortened until the forces on ``free`` unknowns are below ``limit``."""
         for halvings in range(_HALVINGS):
             unknowns = now.unknowns + 0.5**halvings * step
             then = _Tangent(unknowns, *self.equations.assembled(unknowns, frame))

@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and
-areas within it); gradients are turned back into space.
+Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and areas
+within it); gradients are turned back into space.
 """
 
 import time
@@ -32,7 +32,7 @@ _ELEMENTS = {
 
 
 class ScikitFieldSettings(Record):
-    """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
+    """``form``: that of the ``scene``, or always plain ``galerkin``, to show the effect of stabilisation."""
 
     form: Literal["scene", "galerkin"] = "scene"
 
@@ -69,7 +69,7 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right side (N,) of the weak form, without what is fixed; nodes in the order of the problem."""
+    """Matrix (N, N) and right side (N,) of the weak form, without fixed values; nodes in the order of the problem."""
     basis, laid = space(problem)
     place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
 
