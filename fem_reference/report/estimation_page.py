@@ -31,7 +31,12 @@ def page(found: Estimation) -> Page:
         "fibres": _rows(found.curves, "case", "known"),
         "areas": _rows(found.heights, "case", "attachment", "centres"),
         "choices": dict.fromkeys(one.choice for one in found.heights),
-        "drawings": [_figure(), _curves(found), _blobs(), _fits(found)],
+        "drawings": [
+            _figure(),
+            *([_curves(found)] if found.curves else []),
+            _blobs(),
+            *([_fits(found)] if found.fits else []),
+        ],
     }
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
@@ -45,16 +50,22 @@ def _columns(found: Estimation) -> dict[str, Statistic]:
 
 
 def said(found: Estimation) -> str:
-    """The best technique for fibres, and the accuracy of Gaussians, in sentences."""
-    by_technique = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
-    best = min(by_technique, key=lambda name: float(by_technique[name]))
-    most = max(one.gaussians for one in found.fits)
-    fits = [one for one in found.fits if one.gaussians == most]
-    return (
-        f"of curves through a few points of a fibre {best} deviates least; {most} Gaussians miss a muscle's surface by "
-        f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
-        f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
-    )
+    """The best technique for fibres, and the accuracy of Gaussians, where they were measured."""
+    sentences = list[str]()
+    if found.curves:  # not where all fibres have few points
+        by_technique = {
+            name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES
+        }
+        best = min(by_technique, key=lambda name: float(by_technique[name]))
+        sentences.append(f"of curves through a few points of a fibre {best} deviates least")
+    most = max((one.gaussians for one in found.fits), default=0)
+    if fits := [one for one in found.fits if one.gaussians == most]:
+        sentences.append(
+            f"{most} Gaussians miss a muscle's surface by "
+            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+        )
+    return "; ".join(sentences) or "nothing was measured"
 
 
 def facts(found: Estimation) -> dict[str, Any]:
