@@ -21,6 +21,7 @@ from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
+from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors
@@ -218,7 +219,7 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
     if f"load_{kind}_x" in run.scalars:
         yield from enumerate(scalar_vectors(run.scalars, "load_", kind))
     for i, number in enumerate(run.numbers if kind == "force" else ()):
-        if (load := problem.load(number)) is not None:
+        if (load := external_load(problem, number)) is not None:
             yield i, load.force
 
 
@@ -236,15 +237,14 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
     allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    contact, rest = problem.contact, run.surface
+    rest = run.surface
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
-    for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
+    for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
-        for bone in bones:
-            check_of = partial(
-                _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
-            )
+        for bone in problem.obstacles:
+            give = _give(problem, bone, float(pressures[i]))
+            check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)

@@ -25,6 +25,7 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.material_point import State as State
+from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
@@ -151,7 +152,7 @@ class PassiveFibres(Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The tension of the fibres at the greatest expected stretch, against the matrix."""
         greatest = scene.stretch[1]
-        pull = fibre_tension(self, greatest)
+        pull = fibre_tension(self.energy, greatest)
         return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
@@ -205,17 +206,6 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
     """The indicator of fibres that ``pull`` [MPa] at the muscle, by which its surface moves by a ``distance`` [mm]."""
     return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
-
-
-def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
-    """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of the energy."""
-
-    def energy(along: float) -> float:
-        across = along**-0.5
-        F = ((along, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
-        return float(effect.energy(State(F=F, pressure=0.0, fibre=(1.0, 0.0, 0.0))))
-
-    return (energy(stretch + step) - energy(stretch - step)) / (2 * step)
 
 
 @dataclass(frozen=True)

@@ -96,3 +96,14 @@ class State:
         """``x``, or the nearer bound where it lies beyond the bounds."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))
+
+
+def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:
+    """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of an ``energy``."""
+
+    def along(length: float) -> float:
+        across = length**-0.5
+        F = ((length, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
+        return float(energy(State(F=F, pressure=0.0, fibre=(1.0, 0.0, 0.0))))
+
+    return (along(stretch + step) - along(stretch - step)) / (2 * step)

@@ -13,7 +13,6 @@ from fem_reference.effects import Effect, Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.loads import Wrench, total
 from fem_reference.foundations.mesh import (
     Floats,
     Polylines,
@@ -35,7 +34,6 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.kept_meshes import cached as cached_mesh
 from fem_reference.geometry.nested import refined
-from fem_reference.geometry.quadratic import Displaced
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.geometry.signed_distance import Grid
@@ -131,15 +129,6 @@ class MuscleProblem(Setup):
     def contact(self) -> ContactEffect | None:
         """The effect of contact, None where there is none."""
         return among(self.effects)
-
-    def load(self, frame: float, by: Floats | None = None, velocity: Floats | None = None) -> Wrench | None:
-        """The sum of the external loads at a frame, for displacement and velocity of nodes as in ``Displaced``; None where it is
-        not known from these alone. Without displacements its moment is NaN.
-        """
-        shape = Displaced(replace(self.mesh, facets=self.body.mesh.facets), by, velocity)
-        acting = [(one.amount(frame), one.resultant(shape)) for one in self.effects]
-        known = [Wrench(amount * one.force, amount * one.moment) for amount, one in acting if one is not None]
-        return None if len(known) < len(acting) else total(known)
 
     @property
     def obstacles(self) -> tuple[Bone, ...]:

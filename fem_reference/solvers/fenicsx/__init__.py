@@ -17,6 +17,7 @@ from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.quadratic import quadratic
 from fem_reference.problems.body import check_element, check_quadrature
+from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
@@ -100,7 +101,7 @@ def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))
     outer = any(one.outer for one in problem.effects)
-    return exact and outer and problem.load(problem.frames[0], still, still) is not None
+    return exact and outer and external_load(problem, problem.frames[0], still, still) is not None
 
 
 def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
@@ -110,7 +111,7 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     state = frame.state
     assert state is not None  # of a muscle
     by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
-    load = problem.load(frame.number, by, None if since is None else state.rate * quadratic(since))
+    load = external_load(problem, frame.number, by, None if since is None else state.rate * quadratic(since))
     assert load is not None  # as _are_known says
     return vector_scalars("load_force", load.force) | vector_scalars("load_moment", load.moment)
 
