@@ -78,19 +78,18 @@ def least_energy(points: Floats, cells: VertexCells) -> float:
 
 @dataclass(frozen=True, eq=False)
 class GlobalStep:
-    """The global step for given ``attached`` (k,) and ``free`` vertices, factorised once.
+    """The global step for given ``attached`` (k,) and ``free`` vertices (m,), factorised once.
 
-    ``rows`` of the Laplacian are kept, its columns split into ``coupling`` (rows, k) and those of ``factor``; ``fold``, of
-    least squares, is the transpose that both sides are multiplied with. ``loose`` are free vertices that no weights tie to an
-    attached one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
+    ``pick`` (m, n) is what both sides are multiplied with: the rows of free vertices, or for least squares the transpose of their
+    columns. ``coupling`` (m, k) is that of the attached vertices. ``loose`` are free vertices that no weights tie to an attached
+    one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
     """
 
     cells: VertexCells
     attached: Ints
     free: Ints
-    rows: Ints
+    pick: Any
     coupling: Any
-    fold: Any | None
     factor: Any | None
     loose: Ints
 
@@ -99,20 +98,18 @@ class GlobalStep:
         """The system with the rows of attached vertices removed, or kept for least squares."""
         everything, matrix = np.arange(len(cells.rest)), laplacian(cells).tocsr()
         free = np.setdiff1d(everything, attached)
-        rows = free if fixed == "remove" else everything
-        inner, coupling = matrix[rows][:, free], matrix[rows][:, attached]
-        fold = None if fixed == "remove" else inner.T.tocsr()
-        loose = _untied(matrix, attached)
+        columns, loose = matrix[:, free], _untied(matrix, attached)
+        pick = sparse.eye_array(len(everything), format="csr")[free] if fixed == "remove" else columns.T.tocsr()
         solvable = 0 < len(free) < len(everything) and len(loose) == 0
-        factor = factorised(inner if fold is None else fold @ inner) if solvable else None
-        return cls(cells, attached, free, rows, coupling, fold, factor, loose)
+        factor = factorised(pick @ columns) if solvable else None
+        return cls(cells, attached, free, pick, pick @ matrix[:, attached], factor, loose)
 
     def place(self, points: Floats, rotations: Floats) -> Floats:
         """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices where ``points`` has them."""
         moved = points.copy()
         if self.factor is not None:
-            right = right_side(rotations, self.cells)[self.rows] - self.coupling @ points[self.attached]
-            moved[self.free] = self.factor.solve(right if self.fold is None else self.fold @ right)
+            right = self.pick @ right_side(rotations, self.cells) - self.coupling @ points[self.attached]
+            moved[self.free] = self.factor.solve(right)
         return moved
 
 

@@ -167,17 +167,12 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
     surface = frame.surface
     if not problem.attached or surface is None:
         return {}
-    off = np.concatenate(
-        [
-            np.linalg.norm(
-                surface[attached.vertices]
-                - apply(attached.bone.pose(frame.number), problem.surface.points[attached.vertices]),
-                axis=1,
-            )
-            for attached in problem.attached
-        ]
-    )
-    return {"attachment_error_rms": float(np.sqrt(np.mean(off**2))), "attachment_error_max": float(off.max())}
+    off = []
+    for one in problem.attached:
+        wanted = apply(one.bone.pose(frame.number), problem.surface.points[one.vertices])
+        off.append(np.linalg.norm(surface[one.vertices] - wanted, axis=1))
+    errors = np.concatenate(off)
+    return {"attachment_error_rms": float(np.sqrt(np.mean(errors**2))), "attachment_error_max": float(errors.max())}
 
 
 def _samples(problem: MuscleProblem) -> dict[str, tuple[Ints, Floats]]:

@@ -24,11 +24,11 @@ from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import Factorised
+from fem_reference.solvers.fenicsx.meshes import Displacement
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver, Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
-from fem_reference.solvers.fenicsx.reference_cells import Displacement
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent

@@ -6,7 +6,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.solvers.fenicsx.reference_cells import Displacement, tabulate
+from fem_reference.solvers.fenicsx.meshes import Displacement, tabulate
 
 
 class Nodal:
