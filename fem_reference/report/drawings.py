@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from PIL import Image
 
 from fem_reference.foundations.mesh import Floats
@@ -139,9 +139,14 @@ def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
 
 
 def plain_numbers(axis: Any) -> None:
-    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones not at all."""
+    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones only where hardly a major one is seen."""
+
+    def minor(value: float, _: int | None) -> str:
+        low, high = axis.get_view_interval()
+        return number(value) if sum(low <= one <= high for one in axis.get_majorticklocs()) < 2 else ""
+
     axis.set_major_formatter(lambda value, _: number(value))
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_formatter(FuncFormatter(minor))
 
 
 def inline(svg: str, name: str, title: str) -> str:

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from PIL import Image
 
 from fem_reference.report import drawings
@@ -89,3 +90,18 @@ def test_a_picture_is_what_stands_in_a_source() -> None:
     kind, stored = source.split(",")
     assert kind == "data:image/webp;base64"
     assert Image.open(io.BytesIO(base64.b64decode(stored))).size == (4, 3)
+
+
+def test_a_logarithmic_axis_within_a_decade_has_numbers_and_a_longer_one_only_its_powers() -> None:
+    """Between 0.37 and 0.68 no power of ten stands; between 1 and 1000 four do."""
+
+    def labels(low: float, high: float) -> list[str]:
+        axes = Figure().subplots()
+        axes.set_yscale("log")
+        axes.set_ylim(low, high)
+        drawings.plain_numbers(axes.yaxis)
+        shown = zip(axes.yaxis.get_ticklocs(minor=True), axes.yaxis.get_ticklabels(minor=True), strict=True)
+        return [text.get_text() for at, text in shown if low <= at <= high and text.get_text()]
+
+    assert labels(0.37, 0.68) == ["0.400", "0.500", "0.600"]
+    assert labels(1, 1000) == []
