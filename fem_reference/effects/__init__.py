@@ -200,7 +200,7 @@ def passive_tension(effect: Energy, scene: Estimates) -> Indicator:
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
-    """The indicator of fibres that ``pull`` [MPa] at the muscle, by which its surface moves by a ``distance`` [mm]."""
+    """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
     return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
 
 
