@@ -1,6 +1,5 @@
 """Tables of the documentation: what is kept of each measurement, and the rows that a page shows of it."""
 
-import itertools
 import json
 import math
 import re
@@ -16,8 +15,9 @@ from fem_reference.foundations.records import parse
 KEPT = Path(__file__).parent / "measured"
 _SURFACE, _TIME = "surface_deviation.rms", "seconds_processor"
 # Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
-_ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*)")
-_OFF = re.compile(r"(\d+): ([\d.e+-]+) % from that of 40")
+_ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
+_END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
+_STEPS = ("1", "10", "40")
 
 
 class Measurement(NamedTuple):
@@ -177,8 +177,10 @@ def _stress(found: dict[str, Any]) -> Any:
     ends = []
     for one in found["cells"]:
         if one["solver"] == "fenicsx" and (said := _ENDS.search(one["sentence"])):
-            off = {count: float(share) for count, share in _OFF.findall(said[2])}
-            ends.append({"case": one["case"], "verdict": one["verdict"], "frame": int(said[1]), "off": off})
+            off = {count: float(share) if share else status for count, share, _, status in _END.findall(said[2])}
+            finest = {of for _, _, of, _ in _END.findall(said[2]) if of}
+            ends.append({"case": one["case"], "verdict": one["verdict"], "frame": int(said[1])})
+            ends[-1] |= {"off": off | dict.fromkeys(finest, "finest")}
     return {"counts": counts, "ends": ends}
 
 
@@ -193,41 +195,10 @@ def _stress_solvers() -> str:
 def _stress_steps() -> str:
     rows = []
     for one in kept("stress")["measured"]["ends"]:
-        off = (f"{one['off'][count]:.0e} %" if count in one["off"] else "" for count in ("1", "10"))
-        rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *off))
-    return table("stress", ("case", "verdict", "to frame", "1 and 40", "10 and 40"), rows)
-
-
-def _growth(found: dict[str, Any]) -> Any:
-    at = found["result_columns"].index
-    law, cost = (found["results"][f"growth.Candidates.track_{name}"] for name in ("growth", "cost"))
-    laws, costs = (dict(zip(_combinations(one[at("params")]), one[at("result")], strict=True)) for one in (law, cost))
-    rows = []
-    for name in dict.fromkeys(solver for solver, *_ in laws):
-        fit = [value for (solver, of, _), value in laws.items() if (solver, of) == (name, "iteration")]
-        sizes, times = (
-            [value for (solver, _, of), value in costs.items() if (solver, of) == (name, what)]
-            for what in ("size", "iteration")
-        )
-        rows.append({"solver": name, "sizes": [sizes[0], sizes[-1]], "times": [times[0], times[-1]], "fit": fit})
-    return rows
-
-
-def _combinations(params: list[list[str]]) -> Iterable[tuple[str, ...]]:
-    return itertools.product(*([one.strip("'") for one in values] for values in params))
-
-
-def _growth_rows() -> str:
-    rows = []
-    for one in kept("growth")["measured"]:
-        exponent, error, *at = one["fit"]
-        sizes = " to ".join(f"{size:.0f}" for size in one["sizes"])
-        times = " to ".join(number(1000 * time, 2) for time in one["times"])
-        expected, low, high = (number(value, 2) for value in at)
-        rows.append(
-            (f"`{one['solver']}`", sizes, times, f"{exponent:.2f} ± {error:.2f}", f"{expected} ({low} to {high})")
-        )
-    return table("growth", ("solver", "sizes", "an iteration [ms]", "exponent", "at 10^7 [s]"), rows)
+        off = (one["off"].get(count, "") for count in _STEPS)
+        cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
+        rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
+    return table("stress", ("case", "verdict", "to frame", *(f"in {count}" for count in _STEPS)), rows)
 
 
 MEASUREMENTS = {
@@ -236,7 +207,6 @@ MEASUREMENTS = {
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "stress": Measurement("./fem stress --steps", _stress),
-    "growth": Measurement("asv run --bench growth.Candidates --set-commit-hash HEAD", _growth),
 }
 TABLES = {
     "verify_groups": _verify_groups,
@@ -247,5 +217,4 @@ TABLES = {
     "study_reference": _study_reference,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
-    "growth_candidates": _growth_rows,
 }

@@ -93,8 +93,8 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, ``varied``
-    are by name as ``coarse`` with one cause of error halved, and ``exact`` has exact attachments in place of springs.
+    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
+    ``varied`` is ``coarse`` with one cause of error halved, by name, and ``exact`` has exact attachments in place of springs.
 
     ``sizes`` [mm]: those of the tetrahedra; ``safety``: the factor of bars over the expected error.
     """

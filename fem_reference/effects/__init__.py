@@ -204,7 +204,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
-    """The indicator of fibres that ``pull`` [MPa] at the muscle, by which its surface moves by a ``distance`` [mm]."""
+    """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
     return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
 
 

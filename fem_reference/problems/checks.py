@@ -93,13 +93,13 @@ def check_frames(frames: object, place: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    """True of a finite number that is not a bool."""
+    """True for a finite number that is not a bool."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     return number and bool(abs(value) <= _FARTHEST)
 
 
 def _is_integer(value: Any) -> bool:
-    """True of an integer that is not a bool."""
+    """True for an integer that is not a bool."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 

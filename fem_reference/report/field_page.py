@@ -129,7 +129,7 @@ def form(example: Comparison, run: Run) -> str:
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """The values of every run by metric, None where there is none of that run; nothing where the reference failed."""
+    """The values of every run by metric, None where a run has none; empty where the reference failed."""
     if _lost(example.reference):
         return {}
     measured = {"reference": example.changes["reference"]} | example.deviations

@@ -113,12 +113,12 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
 
 
 def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
-    """The error of one of the points of a table as it was measured, without the bar of the truth; None of the truth itself."""
+    """The measured error of a point of a table, without the bar of the truth; None for the truth itself."""
     return None if point.is_truth else point.errors[error] - case.bars.get(error, 0.0)
 
 
 def left_out(case: CaseStudy) -> list[Point]:
-    """The points that are on no front since they did not reach all frames, or were refused."""
+    """The points that did not reach all frames or were refused, and so are on no front."""
     return [point for point in case.points if point.status != "converged"]
 
 
@@ -147,7 +147,7 @@ def _front(case: CaseStudy, error: str) -> Drawing:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """The points as drawings show them, below the truth's bar too where they were measured there, and as they count."""
+    """Pairs of each point with its measured error, also below the truth's bar, and with the error that counts."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)

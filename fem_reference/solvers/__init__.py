@@ -25,7 +25,7 @@ def names(task: Task | None = None) -> list[str]:
 
 
 def _is_shared(module: str) -> bool:
-    """True of a ``module`` of this folder that is no solver but serves some."""
+    """True for a ``module`` of this folder that is no solver but serves some."""
     return module == "common" or module.endswith("_kernels")
 
 

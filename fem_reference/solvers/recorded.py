@@ -217,7 +217,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True of those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
+    """True for those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]

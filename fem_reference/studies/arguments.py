@@ -26,7 +26,7 @@ def check_case(case: object) -> Case:
 
 
 def is_of_body(reference: object, of: object) -> bool:
-    """True of a run of a body; InputError where it is of another body than ``of``."""
+    """True for a run of a body; InputError where it is of another body than ``of``."""
     if not isinstance(reference, Run) or reference.body is None:
         return False
     if reference.body is not of:

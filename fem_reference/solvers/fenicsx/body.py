@@ -285,7 +285,7 @@ class AssembledBody:
 
 
 def _is_changed_from_outside(effect: Effect) -> bool:
-    """True of an energy that changes without deformation of the body."""
+    """True for an energy that changes without deformation of the body."""
     return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
 
 

@@ -86,7 +86,7 @@ class Form:
         self.derivatives = self._made[self._quiet(frame)]
 
     def _quiet(self, frame: float) -> tuple[bool, ...]:
-        """True of each effect that is left out at a frame."""
+        """True for each effect that is left out at a frame."""
         return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
 
     def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: tuple[Any, Any, Any]) -> Derivatives:
