@@ -10,6 +10,7 @@ from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
+from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import (
     Body,
@@ -29,6 +30,7 @@ _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
+_OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fibres are checked too
 _THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
 
 
@@ -212,9 +214,17 @@ def _check_needs(body: Body) -> None:
         return
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
-    cells = np.arange(len(body.mesh.cells))
+    nodes = body.mesh.points[body.mesh.cells]
+    middles = nodes.mean(axis=1)
+    for places in (middles, *(middles + _OUTWARDS * (corner - middles) for corner in np.swapaxes(nodes, 0, 1))):
+        _check_unit(body.fibre, places)
+
+
+def _check_unit(fibre: Directions, places: Floats) -> None:
+    """Raise InputError unless the directions at ``places`` (n, 3) [mm], one in each cell, are unit vectors."""
+    cells = np.arange(len(places))
     try:
-        found = np.asarray(body.fibre(cells, body.mesh.points[body.mesh.cells].mean(axis=1)), float)
+        found = np.asarray(fibre(cells, places), float)
     except Exception as error:  # any error in a function of the caller
         raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
     if found.shape != (len(cells), 3):

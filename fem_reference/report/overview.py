@@ -12,6 +12,7 @@ from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described, find
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
+from fem_reference.report.sections.error_bars import spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
@@ -103,7 +104,8 @@ def _known(result: Comparison) -> list[str]:
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
     lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
-    return lines + [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
+    lines += [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
+    return [*lines, *filter(None, [spread(result)])]
 
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:

@@ -19,6 +19,7 @@ from fem_reference.solvers.fenicsx.session import Session
 ALL, STILL = (0, 1, 2), ((0.0, 0.0, 0.0),) * 3
 NAN, INF = float("nan"), float("inf")
 MESH = fr.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+MIDDLES = MESH.points[MESH.cells].mean(axis=1)
 FIXED = fr.Prescribed("bottom", "z0", ALL, Rest())
 TOP = fr.Prescribed("top", "z1", ALL, Affine(STILL, (0.0, 0.0, 0.1)))
 BODY = fr.Body(MESH, (fr.make_effect("neo_hooke", mu=0.01),), (FIXED, TOP), (0.0, 1.0))
@@ -141,6 +142,12 @@ def test_parts_are_what_they_should_be(changes, message) -> None:
         (ByCell(np.eye(3)[[0, 0, 0, 0, 0, 2]] * np.array([1, 1, 1, 1, 1, 1.01])[:, None]), "of length 1.01 in cell 5"),
         (ByCell(np.eye(3)), "fibre: got IndexError"),
         (lambda *given: given[1][:, 0], r"fibre: got directions \(6,\) at points \(6, 3\)"),
+        # As long as they should be in the middles of cells alone.
+        (
+            lambda _, points: np.eye(3)[[2] * 6] * (1 + np.abs(points - MIDDLES).max(axis=1))[:, None],
+            "a direction of len",
+        ),
+        (lambda _, points: np.where(np.abs(points - MIDDLES) < 1e-9, [0.0, 0, 1], NAN), "a direction of length nan"),
     ],
 )
 def test_fibres_are_unit_vectors(fibre, message) -> None:
