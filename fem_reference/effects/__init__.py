@@ -150,9 +150,8 @@ class PassiveFibres(Energy):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        greatest = scene.stretch[1]
-        pull = fibre_tension(self, greatest)
-        return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
+        pull = fibre_tension(self, scene.stretch[1])
+        return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)))
 
 
 class Load(Effect):
@@ -198,8 +197,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
-    energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
-    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
+    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy))
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
@@ -296,8 +294,7 @@ def make(name: str, **parameters: Any) -> "Effect":
     """
     if not isinstance(name, str) or name not in names():
         raise InputError("effect", f'"{name}"', f"one of {', '.join(names())}")
-    record = find(name)
-    units = {key: unit_of(field.metadata) for key, field in record.model_fields.items()}
-    made = parse(record, {key: written(value, units.get(key, "")) for key, value in parameters.items()}, name)
+    units = {key: unit_of(field.metadata) for key, field in find(name).model_fields.items()}
+    made = parse(find(name), {key: written(value, units.get(key, "")) for key, value in parameters.items()}, name)
     assert isinstance(made, Effect)
     return made

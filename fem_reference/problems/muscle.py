@@ -111,11 +111,6 @@ class MuscleProblem(Setup):
         """The effect of contact, None where there is none."""
         return among(self.effects)
 
-    @property
-    def obstacles(self) -> tuple[Bone, ...]:
-        """The bones in contact with the muscle."""
-        return tuple(bone for bone in self.bones if self.contact is not None and self.contact.is_by(bone.name))
-
     def load(self, frame: float) -> Floats | None:
         """The sum (3,) [N] of the external forces at a frame; None where it depends on the deformation."""
         cells, volume = self.body.mesh, float(tet_volumes(self.mesh.points, self.mesh.tets).sum())
