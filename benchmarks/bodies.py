@@ -8,7 +8,7 @@ import pyvista
 
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
-from fem_reference.foundations.motion import RigidMotion, Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry import tessellation
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
@@ -89,7 +89,7 @@ def spindle(rings: int, slices: int) -> MuscleProblem:
 
 def _bones(half: float, beside: Floats) -> tuple[Bone, Bone]:
     """Balls beyond the ends at -half and half [mm], the upper one turning about the middle."""
-    turning: RigidMotion = Rotation((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 100.0), (0.0, 100 * TURN))
+    turning: RigidMotion = RigidMotion((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 100.0), (0.0, 100 * TURN))
     balls = (Sphere((0.0, 0.0, side * (half + BONE)), BONE) for side in (-1, 1))
     (lower, below), (upper, above) = [(ball, tessellation.tessellated(ball, beside, "bone")) for ball in balls]
     return Bone("lower", below, None, solid=lower), Bone("upper", above, turning, solid=upper)

@@ -8,15 +8,15 @@ import acting
 import numpy as np
 import shapes
 
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
 from fem_reference.problems.body import ByCell
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 
 FRAMES = (10, 15, 20, 25)
-TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
-SLIDES = Translation((0, -3, 4), (10.0, 12.5, 30.0), (0.0, 2.0, 9.0))
+TURNS = RigidMotion((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
+SLIDES = RigidMotion((0, -3, 4), None, (10.0, 12.5, 30.0), (0.0, 2.0, 9.0))
 
 
 def effects(*names: str) -> tuple[Any, ...]:

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
@@ -80,7 +80,7 @@ def _subdivide(points: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarra
 def bar(
     cells: tuple[int, int, int],
     size: tuple[float, float, float],
-    motions: dict[str, Rotation | None],
+    motions: dict[str, RigidMotion | None],
     effects: tuple,
     frames: tuple[int, ...],
 ) -> MuscleProblem:

@@ -13,7 +13,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
 from fem_reference.geometry.penetrations import Depths, depths
@@ -176,7 +176,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     alike = len({bone.motion for bone in bones}) == 1
     for i, (before, number) in enumerate(pairwise(run.numbers), start=1):
         for bone in bones if counts[i] > 0 else ():
-            turns = isinstance(bone.motion, Rotation)
+            turns = bone.motion is not None and bone.motion.centre is not None
             if bone.motion is None or (alike and not turns):
                 continue
             travelled = _travel(bone, before, number) / float(counts[i])
@@ -190,9 +190,8 @@ def _travel(bone: Bone, before: float, after: float) -> float:
     """Travel of a bone between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
     motion = bone.motion
     assert motion is not None  # called for moving bones only
-    amounts = motion.angles if isinstance(motion, Rotation) else motion.distances
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
-    return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
+    return float(np.abs(np.diff(np.interp(stops, motion.frames, motion.amounts))).sum())
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:

@@ -199,8 +199,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
-    energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
-    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
+    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy))
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
@@ -286,8 +285,7 @@ def make(name: str, **parameters: Any) -> "Effect":
     """
     if not isinstance(name, str) or name not in names():
         raise InputError("effect", f'"{name}"', f"one of {', '.join(names())}")
-    record = find(name)
-    units = {key: unit_of(field.metadata) for key, field in record.model_fields.items()}
-    made = parse(record, {key: written(value, units.get(key, "")) for key, value in parameters.items()}, name)
+    units = {key: unit_of(field.metadata) for key, field in find(name).model_fields.items()}
+    made = parse(find(name), {key: written(value, units.get(key, "")) for key, value in parameters.items()}, name)
     assert isinstance(made, Effect)
     return made

@@ -24,11 +24,9 @@ from fem_reference.export import febio_mesh
 from fem_reference.export.febio_contact import add_contact, has_contact, notes
 from fem_reference.export.febio_material import add_fibres, add_materials
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import MuscleCase
 
 # What FEBio has in the same form.
@@ -133,25 +131,17 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
     rigid = SubElement(root, "Rigid")
     curves = _curve_numbers(problem)
     for bone in problem.bones:
-        turns = isinstance(bone.motion, Rotation)
+        turns = bone.motion is not None and bone.motion.centre is not None
         places, angles = ("Rx", "Ry", "Rz"), ("Ru", "Rv", "Rw")
         fixed = (*places, *angles) if bone.motion is None else places if turns else angles
         moved = angles if turns else ("x", "y", "z")
         entry = SubElement(rigid, "rigid_bc", name=f"{febio_mesh.bone_id(bone)}_fixed", type="rigid_fixed")
         febio_mesh.leaves(entry, {"rb": febio_mesh.bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
-        for freedom, share in zip(moved, axis(bone), strict=False):
+        for freedom, share in zip(moved, [] if bone.motion is None else bone.motion.along.tolist(), strict=False):
             kind = "rigid_rotation" if turns else "rigid_displacement"
             entry = SubElement(rigid, "rigid_bc", name=f"{febio_mesh.bone_id(bone)}_{freedom}", type=kind)
             febio_mesh.leaves(entry, {"rb": febio_mesh.bone_id(bone), "dof": freedom})
             febio_mesh.leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
-
-
-def axis(bone: Bone) -> list[float]:
-    """The unit vector that a bone turns about or slides along; none where it rests."""
-    if bone.motion is None:
-        return []
-    along = np.asarray(bone.motion.axis if isinstance(bone.motion, Rotation) else bone.motion.direction, float)
-    return [float(share) for share in along / np.linalg.norm(along)]
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
@@ -169,9 +159,8 @@ def _curves(root: Element, problem: MuscleProblem) -> None:
         if bone.motion is None:
             continue
         motion = bone.motion
-        far = motion.angles if isinstance(motion, Rotation) else motion.distances
         times = sorted({*problem.frames, *(frame for frame in motion.frames if first < frame < last)})
-        points = [(time - first, float(np.interp(time, motion.frames, far))) for time in times]
+        points = [(time - first, float(np.interp(time, motion.frames, motion.amounts))) for time in times]
         _curve(data, numbers[bone.name], "LINEAR", points)
 
 

@@ -35,7 +35,7 @@ _FELT = 1e-3  # [mm]: an overlap at rest that is worth a word
 
 def has_contact(problem: MuscleProblem) -> bool:
     """True where the file has a section ``Contact``, whose tangent is not symmetric."""
-    return bool(problem.obstacles or febio_mesh.by_springs(problem))
+    return bool(febio_mesh.obstacles(problem) or febio_mesh.by_springs(problem))
 
 
 def add_contact(root: Element, problem: MuscleProblem) -> None:
@@ -47,7 +47,7 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
         settings = {"penalty": attached.stiffness, "search_radius": SPRING_SEARCH_RADIUS}
         _pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
     deep = overlaps(problem)
-    for bone in problem.obstacles:
+    for bone in febio_mesh.obstacles(problem):
         assert problem.contact is not None  # or there is no contact
         radius = search_radius(problem, deep[bone.name])
         settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": 0.0}
@@ -62,12 +62,15 @@ def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | N
 
 def overlaps(problem: MuscleProblem) -> dict[str, float]:
     """Depths [mm] by bone in contact of the facets of the contact surface inside it at rest: at corners and middles; 0 outside."""
-    if not problem.obstacles:
+    if not febio_mesh.obstacles(problem):
         return {}
     corners = problem.mesh.points[febio_mesh.free_facets(problem)]
     middles = corners[:, febio_mesh.EDGES[:3]].mean(axis=2)
     points = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
-    inside = ((bone.name, -signed_distances(points, febio_mesh.outward(bone.surface))) for bone in problem.obstacles)
+    inside = (
+        (bone.name, -signed_distances(points, febio_mesh.outward(bone.surface)))
+        for bone in febio_mesh.obstacles(problem)
+    )
     return {name: float(depths.max(initial=0.0)) for name, depths in inside}
 
 

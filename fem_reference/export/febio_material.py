@@ -14,7 +14,6 @@ from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import Rotation
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 
@@ -83,7 +82,8 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
 
 def _centre(bone: Bone) -> Floats:
     """The point [mm] that FEBio turns a bone about: that of its motion."""
-    return np.asarray(bone.motion.centre if isinstance(bone.motion, Rotation) else bone.surface.points.mean(axis=0))
+    centre = None if bone.motion is None else bone.motion.centre
+    return np.asarray(bone.surface.points.mean(axis=0) if centre is None else centre)
 
 
 def add_fibres(root: Element, problem: MuscleProblem) -> None:

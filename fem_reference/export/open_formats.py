@@ -75,9 +75,10 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
 
 def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
     """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
+    contact = problem.contact
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
-        | {"file": name, "obstacle": bone in problem.obstacles}
+        | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
         for entry, name, bone in zip(case.bone, bone_files(problem), problem.bones, strict=True)
     ]
     return {

@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
-from fem_reference.foundations.motion import RigidMotion, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.problems import muscle, scalar
 from fem_reference.problems.estimates import Decision, decisions, estimates
@@ -99,11 +99,10 @@ def _said(value: float | tuple[float, ...]) -> str:
 def _motion(motion: RigidMotion | None) -> str:
     if motion is None:
         return "rests"
-    if isinstance(motion, Translation):
-        how, amounts = f"slides along {_said(motion.direction)}, mm", motion.distances
-    else:
-        how, amounts = f"turns about {_said(motion.centre)} mm along {motion.axis}, rad", motion.angles
-    keys = zip(motion.frames, amounts, strict=True)
+    how = f"slides along {_said(motion.axis)}, mm"
+    if motion.centre is not None:
+        how = f"turns about {_said(motion.centre)} mm along {motion.axis}, rad"
+    keys = zip(motion.frames, motion.amounts, strict=True)
     return f"{how} at frame: {', '.join(f'{amount:g} at {frame:g}' for frame, amount in keys)}"
 
 

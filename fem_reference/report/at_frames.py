@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.problems.setup import Bone
 from fem_reference.report.words import number
 from fem_reference.scenes.case import Case
@@ -34,10 +33,10 @@ def motions(bones: Iterable[Bone]) -> list[Column]:
     found = list[Column]()
     for bone in bones:
         motion = bone.motion
-        if isinstance(motion, Rotation):
-            found.append(Column(bone.name, "°", _at(motion.frames, [math.degrees(angle) for angle in motion.angles])))
-        elif isinstance(motion, Translation):
-            found.append(Column(bone.name, "mm", _at(motion.frames, list(motion.distances))))
+        if motion is not None and motion.centre is not None:
+            found.append(Column(bone.name, "°", _at(motion.frames, [math.degrees(angle) for angle in motion.amounts])))
+        elif motion is not None:
+            found.append(Column(bone.name, "mm", _at(motion.frames, list(motion.amounts))))
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.effects import Effect
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
@@ -58,13 +58,12 @@ class Motion(Record):
         increasing([key.frame for key in self.keyframes], "keyframes in the order of their frames")
         return self
 
-    def poses(self) -> Rotation | Translation:
+    def poses(self) -> RigidMotion:
         """The motion as poses over frame numbers."""
         frames = tuple(key.frame for key in self.keyframes)
-        if self.axis is not None and self.centre is not None:
-            return Rotation(self.axis, self.centre, frames, tuple(key.angle or 0.0 for key in self.keyframes))
-        assert self.direction is not None  # a Motion record has one of the two
-        return Translation(self.direction, frames, tuple(key.distance or 0.0 for key in self.keyframes))
+        axis = self.axis if self.direction is None else self.direction
+        assert axis is not None  # a Motion record has one of the two
+        return RigidMotion(axis, self.centre, frames, tuple(key.angle or key.distance or 0.0 for key in self.keyframes))
 
 
 class CaseHalfSpace(Record):

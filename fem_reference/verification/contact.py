@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
@@ -23,7 +23,7 @@ BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, an
 
 def sliding_by(path: float) -> Callable[[float], Floats]:
     """The pose, 4 x 4, of what slides along z by a ``path`` [mm] from frame 0 to frame 1."""
-    return Translation((0.0, 0.0, 1.0), (0.0, 1.0), (0.0, path)).pose
+    return RigidMotion((0.0, 0.0, 1.0), None, (0.0, 1.0), (0.0, path)).pose
 
 
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:

@@ -13,7 +13,7 @@ from fem_reference.assessment.differences import carried, typical, typical_chang
 from fem_reference.assessment.error_bars import Pair
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, enclosed_volume
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.setup import Bone, Joint
 from fem_reference.runs.store import Outcome, Run
@@ -274,7 +274,7 @@ def test_forces_and_moments_have_bars_in_their_own_units() -> None:
     the sizes differ by 1.83 a h^1.5; the force, one number at one place, is taken to be of first order, and a fifth less certain.
     The arm is 30 mm on both, and unknown at rest. Without forces there is no bar.
     """
-    motion = Rotation((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2))
+    motion = RigidMotion((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2))
     bone = Bone("femur", REST, motion)
     joint = Joint("hip", bone, np.array([1.0, 0, 0]), np.zeros(3), lambda frame: 0.01 * frame)
 

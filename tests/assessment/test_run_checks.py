@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from fem_reference import effects
 from fem_reference.assessment import second_check
 from fem_reference.assessment.run_checks import RunCheck, _give, of_body, of_muscle
-from fem_reference.foundations.motion import Rotation as Turn
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.motion import RigidMotion as Turn
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin
@@ -114,7 +114,7 @@ def test_frames_and_what_is_not_finite(tmp_path) -> None:
 
 def test_exact_attachments_are_where_their_bones_are(tmp_path) -> None:
     problem = away(coarse(tmp_path))
-    lid = replace(problem.bones[1], motion=Translation((1.0, 0.0, 0.0), (0.0, 20.0), (0.0, 4.0)))
+    lid = replace(problem.bones[1], motion=RigidMotion((1.0, 0.0, 0.0), None, (0.0, 20.0), (0.0, 4.0)))
     high = replace(problem.attached[1], bone=lid)
     problem = replace(problem, bones=(problem.bones[0], lid), attached=(problem.attached[0], high))
     assert lost(problem, resting(problem)) == ["high off lid"]

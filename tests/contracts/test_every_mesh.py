@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fem_reference.foundations.mesh import Surface, boundary, check_closed, enclosed_volume, vertex_areas
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.block import fill
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
@@ -113,7 +113,7 @@ def test_hip_attachment_is_the_flat_end_and_no_more(hip: dict[str, Surface], bon
 def test_hip_leaves_the_joint_free(hip: dict[str, Surface]) -> None:
     assert np.linalg.norm(samples(hip["muscle"]), axis=1).min() > 22 + 3  # the femoral head has a radius of 22 mm
     for angle in np.linspace(0, -1, 6):
-        pose = Rotation((1, 0, 0), (0, 0, 0), (0.0, 1.0), (0.0, angle)).pose(1)
+        pose = RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 1.0), (0.0, angle)).pose(1)
         femur = apply(pose, samples(hip["femur"]))
         assert signed(femur, hip["pelvis"]).min() > 1.0
         back = apply(np.linalg.inv(pose), samples(hip["pelvis"]))

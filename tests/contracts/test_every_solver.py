@@ -9,7 +9,7 @@ import shapes
 from fem_reference import effects, solvers
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, TetMesh
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import Record, parse
 from fem_reference.io import files
 from fem_reference.problems import scalar
@@ -28,7 +28,7 @@ MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": "10 kPa"}),
     effects.find("incompressible").model_validate({"bulk": "10 MPa"}),
 )
-BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
+BEND = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
 
 
 def offered(task: str) -> list:
@@ -40,7 +40,7 @@ def offered(task: str) -> list:
 OFFERS = [(name, offer.task) for name in solvers.names() for offer in solvers.offers(name)]
 
 
-def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> MuscleProblem:
+def problem(motion: RigidMotion | None = BEND, other: RigidMotion | None = None) -> MuscleProblem:
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": other, "top": motion}, MUSCLE, (0, 5, 10))
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.export import forces
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.io.formats import vtk
 from fem_reference.metrics import Measure
 from fem_reference.problems.setup import AttachedVertices, Joint, Setup
@@ -35,7 +35,7 @@ def compared(tmp_path, monkeypatch: pytest.MonkeyPatch) -> Comparison:
     """The reference pulls the plate, which turns about x; "quick" has arms and no force."""
     found = small_comparison(tmp_path, monkeypatch)
     numbers, plate = found.reference.numbers, found.setup.bones[0]
-    turns = Rotation((1, 0, 0), tuple(CENTRE), tuple(map(float, numbers)), (0.0, 0.1, 0.2, 0.3, 0.4))
+    turns = RigidMotion((1, 0, 0), tuple(CENTRE), tuple(map(float, numbers)), (0.0, 0.1, 0.2, 0.3, 0.4))
     bone = replace(plate, motion=turns)
     joint = Joint("knee", bone, np.array([1.0, 0, 0]), CENTRE, lambda frame: 0.01 * frame)
     setup = Setup(

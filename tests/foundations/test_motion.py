@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 
 AXIS, CENTRE = (1.0, -2.0, 0.5), (10.0, 20.0, -3.0)
-TURN = Rotation(AXIS, CENTRE, (0.0, 10.0, 30.0), (0.0, 1.0, -0.5))
+TURN = RigidMotion(AXIS, CENTRE, (0.0, 10.0, 30.0), (0.0, 1.0, -0.5))
 
 
 @pytest.mark.parametrize("frame", [0, 3.3, 10, 25, 30])
@@ -35,7 +35,7 @@ def test_rest_is_exact() -> None:
 
 def test_positive_angle_is_right_handed() -> None:
     # A quarter turn about the line along z through (1, 0, 0) takes (2, 0, 5) to (1, 1, 5).
-    quarter = Rotation((0, 0, 3), (1, 0, 0), (0.0, 10.0), (0.0, np.pi / 2))
+    quarter = RigidMotion((0, 0, 3), (1, 0, 0), (0.0, 10.0), (0.0, np.pi / 2))
     moved = apply(quarter.pose(10), np.array([[2.0, 0.0, 5.0]]))
     assert moved == pytest.approx(np.array([[1.0, 1.0, 5.0]]), abs=1e-14)
 
@@ -43,11 +43,11 @@ def test_positive_angle_is_right_handed() -> None:
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
 def test_length_of_the_axis_does_not_matter(scale: float) -> None:
     x, y, z = (scale * entry for entry in AXIS)
-    assert Rotation((x, y, z), CENTRE, TURN.frames, TURN.angles).pose(7) == pytest.approx(TURN.pose(7), abs=1e-12)
+    assert RigidMotion((x, y, z), CENTRE, TURN.frames, TURN.amounts).pose(7) == pytest.approx(TURN.pose(7), abs=1e-12)
 
 
 # 2 and 1 and 2 mm along the direction for 3 mm of distance.
-SLIDE = Translation((2.0, -1.0, 2.0), (0.0, 10.0, 30.0), (0.0, 90.0, -30.0))
+SLIDE = RigidMotion((2.0, -1.0, 2.0), None, (0.0, 10.0, 30.0), (0.0, 90.0, -30.0))
 
 
 @pytest.mark.parametrize(
@@ -70,4 +70,4 @@ def test_rest_before_a_slide_is_exact() -> None:
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
 def test_length_of_the_direction_does_not_matter(scale: float) -> None:
     x, y, z = (scale * entry for entry in SLIDE.direction)
-    assert Translation((x, y, z), SLIDE.frames, SLIDE.distances).pose(7) == pytest.approx(SLIDE.pose(7), abs=1e-12)
+    assert RigidMotion((x, y, z), None, SLIDE.frames, SLIDE.amounts).pose(7) == pytest.approx(SLIDE.pose(7), abs=1e-12)

@@ -13,7 +13,7 @@ import small
 
 from fem_reference import cli
 from fem_reference.foundations.mesh import Surface
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.io import files
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
@@ -132,7 +132,7 @@ def test_shifted_by_one_mm_scores_one_mm(job, tmp_path) -> None:
 
 
 def test_moving_the_whole_scene_changes_no_measure(job, tmp_path) -> None:
-    pose = Rotation((1, -2, 0.5), (20, 0, 5), (0.0, 1.0), (0.0, 2.1)).pose(1)
+    pose = RigidMotion((1, -2, 0.5), (20, 0, 5), (0.0, 1.0), (0.0, 2.1)).pose(1)
     pose[:3, 3] += [300, -200, 50]
     moved = Job(tmp_path, pose)
     assert len(moved.facts["measures"]) == len(job.facts["measures"])

@@ -12,7 +12,7 @@ from scipy.integrate import simpson
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, tet_volumes
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.io import files
 from fem_reference.metrics import MeasurementContext, at_rest, context_of, find, measure
 from fem_reference.metrics.fibre_length import both_lengths
@@ -53,9 +53,9 @@ def pulled(forces: np.ndarray = FORCES) -> Run:
 
 
 def context(run: Run, angles: tuple[float, ...] = (0.0, 0.1, 0.2)) -> MeasurementContext:
-    motion = Rotation((1, 0, 0), (1, 2, 0), (0.0, 1.0, 2.0), angles)
+    motion = RigidMotion((1, 0, 0), (1, 2, 0), (0.0, 1.0, 2.0), angles)
     bone = Bone("femur", BALL, motion)
-    joint = Joint("hip", bone, AXIS, CENTRE, lambda frame: float(np.interp(frame, motion.frames, motion.angles)))
+    joint = Joint("hip", bone, AXIS, CENTRE, lambda frame: float(np.interp(frame, motion.frames, motion.amounts)))
     assert run.fibres is not None
     return MeasurementContext.of(run, run.fibres, (bone,), None, (joint,))
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.obstacles import Quadric
 from fem_reference.geometry.wrapping import around
 from fem_reference.metrics import MeasurementContext, at_rest, measure
@@ -25,9 +25,9 @@ FIXED, MOVING = np.array([[0.0, 60, 5], [0, 50, -5]]), np.array([[45.0, 0, 5], [
 def joint_of(angles: Floats, axis: tuple[float, float, float] = (0, 0, 1), centre: Floats | None = None) -> Joint:
     """A hinge whose bone is at each of ``angles`` [rad] at frame 0, 1, ..."""
     at = np.zeros(3) if centre is None else centre
-    motion = Rotation(axis, tuple(at), tuple(map(float, range(len(angles)))), tuple(angles))
+    motion = RigidMotion(axis, tuple(at), tuple(map(float, range(len(angles)))), tuple(angles))
     bone = Bone("femur", BALL, motion)
-    return Joint("hip", bone, np.array(axis), at, lambda frame: float(np.interp(frame, motion.frames, motion.angles)))
+    return Joint("hip", bone, np.array(axis), at, lambda frame: float(np.interp(frame, motion.frames, motion.amounts)))
 
 
 def context_of(joint: Joint, run: Run, bones: tuple[Bone, ...] = ()) -> MeasurementContext:
@@ -126,7 +126,7 @@ def test_there_and_back_and_at_rest() -> None:
 
 def test_where_two_bones_move_there_is_no_arm() -> None:
     joint = joint_of(np.radians([0, 4, 8, 12]))
-    other = Bone("pelvis", BALL, Rotation((1, 0, 0), (0, 0, 0), (2.0, 3.0), (0.0, 0.1)))
+    other = Bone("pelvis", BALL, RigidMotion((1, 0, 0), (0, 0, 0), (2.0, 3.0), (0.0, 0.1)))
     run = straight(joint, 4)
     arms = arms_of(run, context_of(joint, run, (other,)))
     assert np.isnan(arms).all(axis=1).tolist() == [False, False, True, True]

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from fem_reference.assessment.comparison import compare
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
@@ -28,7 +28,7 @@ PLATE = shapes.skin(shapes.box((1, 1, 1), (60.0, 60.0, 10.0)))
 LOW = float(BALL.points[:, 2].min())  # [mm]
 
 
-def floor(height: float, motion: Rotation | None = None) -> Bone:
+def floor(height: float, motion: RigidMotion | None = None) -> Bone:
     """All below z = ``height`` [mm]."""
     return Bone("floor", PLATE, motion, solid=HalfSpace((0, 0, height), (0, 0, 1)))
 
@@ -70,7 +70,7 @@ def test_a_ball_pressed_into_a_floor_is_as_deep_as_it_went() -> None:
 def test_a_bone_is_where_its_frame_number_takes_it() -> None:
     # The floor turns by a quarter about x through the origin from frame 0 to 10: then it is the wall y > 15, to the left of which
     # the ball rests that was above it. Frames are numbered 0, 10, 20.
-    wall = floor(-15.0, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi / 2)))
+    wall = floor(-15.0, RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi / 2)))
     behind = BALL.points + [0, -4.0, 0]
     deepest, _ = taken(run_of(BALL.points, behind, BALL.points, numbers=(0, 10, 20)), wall)
     side = float(BALL.points[:, 1].max())
@@ -90,7 +90,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
     # A head of 15 mm at z = 40 mm that a half turn about x takes to z = -40 mm.
     head = shapes.sphere(3, 15.0)
     head = Surface(head.points + [0, 0, 40], head.triangles)
-    bone = Bone("head", head, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
+    bone = Bone("head", head, RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
     lowered = BALL.points - [0, 0, 7.0]
     deepest, volume = taken(run_of(lowered, lowered, numbers=(0, 10)), bone)
     exact = (15 - np.linalg.norm(lowered - [0, 0, -40], axis=1)).max()
@@ -135,7 +135,7 @@ def test_where_contact_is_exempt_what_has_been_added_since_rest_counts(slides, a
     # bone. All the rest goes out.
     bar = shapes.skin(shapes.box((1, 1, 80), (10.0, 10.0, 40.0)))
     z = bar.points[:, 2]
-    aside = Translation((0, 1, 0), (0.0, 1.0), (0.0, 5.0)) if slides else None
+    aside = RigidMotion((0, 1, 0), None, (0.0, 1.0), (0.0, 5.0)) if slides else None
     wall = Bone("wall", PLATE, aside, solid=HalfSpace((0.3, 0, 0), (1, 0, 0)))
     base = floor(-5.0)
     rest = Setup(bar, (base, wall), (AttachedVertices("origin", base, np.flatnonzero(z == 0)),), (0, 1), None)
@@ -170,7 +170,7 @@ def test_what_flat_triangles_cut_off_a_round_bone_does_not_count_unless_they_are
 def test_a_bone_between_the_vertices_of_a_coarse_surface_is_met() -> None:
     # A ball of 3 mm goes through a bar, both its sides 10 mm away from any vertex; its own middle is in it for 10 mm.
     bar = shapes.skin(shapes.box((1, 1, 1), (10.0, 10.0, 40.0)))
-    stone = Translation((1, 0, 0), (0.0, 22.0), (0.0, 22.0))
+    stone = RigidMotion((1, 0, 0), None, (0.0, 22.0), (0.0, 22.0))
     ball = Bone("ball", shapes.sphere(2, 3.0).moved_to(shapes.sphere(2, 3.0).points + [-4, 5, 20]), stone)
     ball = replace(ball, solid=Sphere((-4, 5, 20), 3.0))
     numbers = (0, 2, 3, 6, 9, 13, 16, 18, 20)

@@ -13,7 +13,7 @@ from acting import PARAMETERS
 from auto_scenes import pennate
 
 from fem_reference.effects import make
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.problems import estimates, guess, muscle
 from fem_reference.problems.estimates import Near
 from fem_reference.runs.store import Frame, Outcome
@@ -29,7 +29,7 @@ BALL = '\n[[bone]]\nname = "ball"\nsphere = { centre = "40, 0, 15 mm", radius = 
 def test_bones_turn_against_each_other_by_the_difference(first: float, last: float) -> None:
     """About one axis through different points; turned alike they bend nothing."""
     motions = {
-        name: Rotation((1, 2, 2), centre, (0.0, 10.0), (0.0, angle))
+        name: RigidMotion((1, 2, 2), centre, (0.0, 10.0), (0.0, angle))
         for name, centre, angle in (("bottom", (0.0, 0.0, 0.0), first), ("top", (5.0, -3.0, 40.0), last))
     }
     rest = shapes.bar((1, 1, 3), (10, 10, 30), motions, (), (0, 10))
@@ -40,7 +40,7 @@ def test_bones_turn_against_each_other_by_the_difference(first: float, last: flo
 def slid(bottom: tuple[float, float, float] | None, top: tuple[float, float, float]):
     """A bar of 10 x 10 x 30 mm whose ends slide by 6 mm in 10 frames, each its way or not at all."""
     ways = {"bottom": bottom, "top": top}
-    motions = {name: way and Translation(way, (0.0, 10.0), (0.0, 6.0)) for name, way in ways.items()}
+    motions = {name: way and RigidMotion(way, None, (0.0, 10.0), (0.0, 6.0)) for name, way in ways.items()}
     return shapes.bar((2, 2, 6), (10, 10, 30), motions, (), (0, 10))
 
 
@@ -49,7 +49,7 @@ def test_a_straight_bar_sags_by_a_twentieth_of_its_travel_and_an_eighth_of_its_t
     assert guess.thickness_of(rest) == pytest.approx(2 * 3000 / 1400, rel=1e-12)
     assert guess.length_of(rest) == pytest.approx(30, rel=1e-12)
     assert guess.sag(rest, [0, 10], 7.0) == pytest.approx(0.35, rel=1e-9)
-    turned = Rotation((1, 0, 0), (5.0, 5.0, 30.0), (0.0, 10.0), (0.0, 0.4))
+    turned = RigidMotion((1, 0, 0), (5.0, 5.0, 30.0), (0.0, 10.0), (0.0, 0.4))
     bent = shapes.bar((2, 2, 6), (10, 10, 30), {"bottom": None, "top": turned}, (), (0, 10))
     assert guess.sag(bent, [0, 10], 7.0) == pytest.approx(0.35 + 0.4 * 30 / 8, rel=1e-9)
 

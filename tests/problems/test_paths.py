@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.problems.paths import Affine, Along, Follows, From, Rest, Turn, amount, radially
 
 POINTS = np.random.default_rng(3).uniform(-5, 5, (12, 3))
@@ -69,9 +69,9 @@ def test_radial_points_go_away_along_the_axes_that_count() -> None:
 
 
 def test_what_is_attached_to_a_bone_goes_with_it() -> None:
-    down = Translation((0.0, -2.0, 0.0), (0.0, 10.0), (0.0, 30.0))
+    down = RigidMotion((0.0, -2.0, 0.0), None, (0.0, 10.0), (0.0, 30.0))
     assert Follows(down.pose)(POINTS, 5.0) == pytest.approx(np.tile([0.0, -15, 0], (12, 1)), abs=1e-12)
-    turned = Rotation((1, 2, 2), (5.0, 0.0, 1.0), (0.0, 10.0), (0.0, 0.8))
+    turned = RigidMotion((1, 2, 2), (5.0, 0.0, 1.0), (0.0, 10.0), (0.0, 0.8))
     same = Turn((1.0, 2.0, 2.0), 0.4, (5.0, 0.0, 1.0))
     follows = Follows(turned.pose)
     assert follows(POINTS, 5.0) == pytest.approx(same(POINTS, 1.0), abs=1e-12)
@@ -80,7 +80,7 @@ def test_what_is_attached_to_a_bone_goes_with_it() -> None:
 
 
 def test_a_pose_that_begins_late_is_that_of_its_first_frame_before() -> None:
-    turned = Rotation((0, 0, 1), (0.0, 0.0, 0.0), (0.0, 4.0, 10.0), (0.0, 0.8, 0.2))
+    turned = RigidMotion((0, 0, 1), (0.0, 0.0, 0.0), (0.0, 4.0, 10.0), (0.0, 0.8, 0.2))
     late = From(2.0, turned.pose)
     for frame in (-3.0, 0.0, 2.0):
         assert np.array_equal(late(frame), turned.pose(2.0))
@@ -95,6 +95,6 @@ def test_fibres_along_one_direction_have_it_everywhere() -> None:
 
 
 def test_paths_reach_another_process() -> None:
-    turned = Rotation((1, 2, 2), (5.0, 0.0, 1.0), (0.0, 10.0), (0.0, 0.8))
+    turned = RigidMotion((1, 2, 2), (5.0, 0.0, 1.0), (0.0, 10.0), (0.0, 0.8))
     for path in (Turn((0.0, 1.0, 0.0), 0.7), radially(0.1), Follows(From(2.0, turned.pose))):
         assert np.array_equal(pickle.loads(pickle.dumps(path))(POINTS, 3.0), path(POINTS, 3.0))

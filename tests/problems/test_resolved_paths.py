@@ -8,7 +8,7 @@ import shapes as surfaces
 
 from fem_reference import effects
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
@@ -21,7 +21,7 @@ from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 
 ALL, STILL = (0, 1, 2), ((0.0, 0.0, 0.0),) * 3
 NEO_HOOKE = effects.make("neo_hooke", mu="10 kPa")
-ALONG_Z = Rotation((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1.0), (0.0, 2 * np.pi))
+ALONG_Z = RigidMotion((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1.0), (0.0, 2 * np.pi))
 
 
 def body(head, frames=(0.0, 20.0), foot=None, acting=(NEO_HOOKE,)) -> Body:
@@ -45,7 +45,7 @@ def test_a_whole_turn_is_four_steps_wherever_it_is_among_the_frames() -> None:
     assert body(Follows(From(0.0, bone.pose))).stops == pytest.approx([0.25, 0.5, 0.75])
     # What a motion does before the first frame is no part of the path.
     assert body(Follows(From(0.5, ALONG_Z.pose)), frames=(0.5, 20.0)).stops == pytest.approx([0.75])
-    hasty = Rotation((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1e-6), (0.0, 2 * np.pi))
+    hasty = RigidMotion((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1e-6), (0.0, 2 * np.pi))
     assert body(Follows(hasty.pose)).stops == pytest.approx([0.25e-6, 0.5e-6, 0.75e-6])
 
 
@@ -66,7 +66,7 @@ def test_a_turn_beside_a_long_way_counts() -> None:
 def test_there_and_back_is_two_steps() -> None:
     knots = ((0.0, 0.0), (0.4, 1.0), (1.0, 0.0))
     assert body(Affine(STILL, (0.0, 0.0, 1.0), knots)).stops == pytest.approx([0.4])
-    slide = Translation((0, 0, 1), (0.0, 0.4, 1.0), (0.0, 1.0, 0.0))
+    slide = RigidMotion((0, 0, 1), None, (0.0, 0.4, 1.0), (0.0, 1.0, 0.0))
     assert body(Follows(slide.pose)).stops == pytest.approx([0.4])
     # A sine, greatest at 1/4 and 3/4. Of a way w there, what comes back unnoticed, b, has w + b <= 1.12 (w - b) and 1 % of the
     # body's size.
@@ -174,13 +174,13 @@ def setup(motion, frames=(0, 5, 20)) -> Setup:
 @pytest.mark.parametrize(
     ("motion", "parts", "seen"),
     [
-        (Rotation((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 1, False),
-        (Rotation((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 4, True),
-        (Rotation((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 40, True),
-        (Rotation((0, 0, 1), (0, 0, 0), (0.0, 4.0), (0.0, 2 * np.pi)), 1, True),
-        (Rotation((0, 0, 1), (0, 0, 0), (0.0, 4.0), (0.0, 2.1 * np.pi)), 1, False),
-        (Translation((0, 0, 1), (0.0, 6.5, 7.0), (0.0, 1.0, 0.5)), 1, False),
-        (Translation((0, 0, 1), (0.0, 6.0, 7.0), (0.0, 1.0, 0.5)), 1, True),
+        (RigidMotion((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 1, False),
+        (RigidMotion((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 4, True),
+        (RigidMotion((0, 0, 1), (0, 0, 0), (0.0, 1.0), (0.0, 2 * np.pi)), 40, True),
+        (RigidMotion((0, 0, 1), (0, 0, 0), (0.0, 4.0), (0.0, 2 * np.pi)), 1, True),
+        (RigidMotion((0, 0, 1), (0, 0, 0), (0.0, 4.0), (0.0, 2.1 * np.pi)), 1, False),
+        (RigidMotion((0, 0, 1), None, (0.0, 6.5, 7.0), (0.0, 1.0, 0.5)), 1, False),
+        (RigidMotion((0, 0, 1), None, (0.0, 6.0, 7.0), (0.0, 1.0, 0.5)), 1, True),
         (None, 1, True),
     ],
 )

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.report.at_frames import label
 from tests.report.comparisons import html
 
@@ -15,5 +15,5 @@ def test_a_frame_is_its_number_with_what_is_known_there(comparison):
     frames = comparison.scene.frames.model_copy(update={"interval": 0.05})
     timed = comparison.scene.model_copy(update={"frames": frames})
     assert label(timed, comparison.setup, 20) == "frame 20 (time 1 s, plate 28.6°)"
-    slid = replace(comparison.setup.bones[0], motion=Translation((1, 0, 0), (0, 40), (0.0, 8.0)))
+    slid = replace(comparison.setup.bones[0], motion=RigidMotion((1, 0, 0), None, (0, 40), (0.0, 8.0)))
     assert label(comparison.scene, replace(comparison.setup, bones=(slid,)), 10) == "frame 10 (plate 2 mm)"

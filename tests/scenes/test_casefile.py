@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.problems.muscle import solid
 from fem_reference.scenes import casefile
@@ -41,7 +41,7 @@ def test_scene_has_what_the_file_says(bar: Path) -> None:
     assert (scene.muscle.unit, scene.muscle.tet_size) == pytest.approx((10.0, 20.0))
     assert scene.bone[0].motion is None
     assert scene.bone[1].motion is not None
-    assert scene.bone[1].motion.poses() == Rotation(
+    assert scene.bone[1].motion.poses() == RigidMotion(
         (0.0, 0.0, 2.0), (10.0, 20.0, 30.0), (0.0, 10.0), (0.0, pytest.approx(math.pi / 2))
     )
     assert scene.bone[1].motion.centre == pytest.approx((10.0, 20.0, 30.0))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from fem_reference.problems.muscle import solid
 from fem_reference.scenes import casefile
@@ -212,7 +212,7 @@ def test_a_bone_may_have_a_closed_form(bar: Path, table: dict[str, object], body
 def test_a_bone_may_slide(bar: Path) -> None:
     motion = changed(bar, "bone[1].motion", SLIDE).bone[1].motion
     assert motion is not None
-    assert motion.poses() == Translation((0.0, -3.0, 0.0), (0.0, 9.0), (0.0, 10.0))
+    assert motion.poses() == RigidMotion((0.0, -3.0, 0.0), None, (0.0, 9.0), (0.0, 10.0))
 
 
 @pytest.mark.parametrize(("number", "printed"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])

@@ -10,7 +10,7 @@ import shapes
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import arap
@@ -23,9 +23,9 @@ USUAL = {
     "iterations": 5,
 }
 EXACT = {"iterations": 3000, "tolerance": "1e-13 mm"}
-TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
-SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 10.0), (0.0, 0.5))
-JUMP = Rotation((1, 0, 0), (0, 20, -10), (0.0, 1.0), (0.0, 0.5))
+TURN = RigidMotion((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+SWING = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 10.0), (0.0, 0.5))
+JUMP = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 1.0), (0.0, 0.5))
 WEIGHTS = ("cotangent", "clamped cotangent", "kirchhoff", "tutte")
 
 
@@ -206,7 +206,7 @@ def test_attached_vertices_go_with_their_bone():
 def test_independent_of_where_the_world_is(fixed, volume_step):
     # Positions of 60 mm, roundings of 1e-14 that least squares multiply by their condition of 1e6.
     x, y, z = TURN[:3, :3] @ SWING.axis
-    moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
+    moved = RigidMotion((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.amounts)
     changes = {"fixed": fixed, "volume_step": volume_step}
     _, here = run(attached_setup(None, SWING, last=10), **changes)
     _, there = run(attached_setup(None, moved, last=10, pose=TURN), **changes)
@@ -325,7 +325,7 @@ def test_scaling_a_surface_that_encloses_nothing_leaves_it():
 
 def test_a_muscle_blown_up_by_scaling_is_an_outcome():
     # A bar pressed to nothing in ten frames: what is not attached is scaled without end.
-    down = Translation((0, 0, -1), (0.0, 10.0), (0.0, 31.0))
+    down = RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 31.0))
     given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": down}, (), tuple(range(11)))
     outcome, _ = run(given, weights="clamped cotangent", volume_step=True, iterations=4)
     assert outcome.status == "diverged"
@@ -334,7 +334,7 @@ def test_a_muscle_blown_up_by_scaling_is_an_outcome():
 
 def test_positions_that_are_no_number_are_an_outcome():
     outcome, frames = run(
-        attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0, 0.01, math.nan)), last=4)
+        attached_setup(None, RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0, 0.01, math.nan)), last=4)
     )
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
@@ -345,7 +345,7 @@ def test_positions_that_are_no_number_are_an_outcome():
 @pytest.mark.parametrize("volume_step", [False, True])
 def test_a_surface_turned_inside_out_is_an_outcome(volume_step):
     # The ends change places in one frame: with a single iteration rotations cannot follow, and scaling must not mirror.
-    through = Translation((0, 0, -1), (0.0, 1.0), (0.0, 150.0))
+    through = RigidMotion((0, 0, -1), None, (0.0, 1.0), (0.0, 150.0))
     outcome, frames = run(attached_setup(None, through), iterations=1, volume_step=volume_step)
     assert outcome.status == "inverted"
     assert outcome.message.startswith("frame 1: the surface is turned inside out")

@@ -8,7 +8,7 @@ import shapes
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.setup import AttachedVertices, Setup
 from fem_reference.solvers import arap, arap_pbd
@@ -67,7 +67,7 @@ def test_what_it_ends_with_is_stationary(weights):
 @pytest.mark.parametrize("seed", range(4))
 def test_less_energy_than_scaling_by_turns_at_the_same_volume(seed):
     random = np.random.default_rng(seed)
-    motion = Rotation(tuple(random.normal(size=3)), tuple(random.normal(scale=20, size=3)), (0.0, 1.0), (0.0, 0.7))
+    motion = RigidMotion(tuple(random.normal(size=3)), tuple(random.normal(scale=20, size=3)), (0.0, 1.0), (0.0, 0.7))
     setup = attached_setup(None, motion, muscle(noise=1.0, seed=seed))
     triangles, states = setup.surface.triangles, []
     by_turns = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": True}
@@ -113,7 +113,7 @@ def test_a_rigid_motion_is_reproduced(usual):
 @pytest.mark.parametrize("usual", [CONSTRAINT, GUESS])
 def test_independent_of_where_the_world_is(usual):
     x, y, z = TURN[:3, :3] @ SWING.axis
-    moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
+    moved = RigidMotion((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.amounts)
     _, here = run(attached_setup(None, SWING, last=10), usual)
     _, there = run(attached_setup(None, moved, last=10, pose=TURN), usual)
     np.testing.assert_allclose(
@@ -176,7 +176,7 @@ def test_both_at_once():
 
 def test_a_volume_out_of_reach_is_an_outcome():
     # Every vertex is attached to one of two bones, which move apart.
-    setup = attached_setup(None, Translation((0, 0, 1), (0.0, 1.0), (0.0, 10.0)))
+    setup = attached_setup(None, RigidMotion((0, 0, 1), None, (0.0, 1.0), (0.0, 10.0)))
     upper = setup.surface.points[:, 2] > 0
     attached = tuple(
         AttachedVertices(bone.name, bone, np.flatnonzero(mask))
@@ -190,7 +190,7 @@ def test_a_volume_out_of_reach_is_an_outcome():
 
 def pressed(travel):
     """A bar of 30 mm whose upper end goes down by ``travel`` [mm] in one frame."""
-    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, travel))
+    down = RigidMotion((0, 0, -1), None, (0.0, 1.0), (0.0, travel))
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
 
 

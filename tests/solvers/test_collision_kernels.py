@@ -5,7 +5,7 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build
 from fem_reference.problems.setup import Bone
@@ -19,12 +19,12 @@ def grid() -> Grid:
     return build(BALL, 2.0, 6.0)
 
 
-def floor(height: float = 0.0, motion: Translation | None = None, normal=(0, 0, 1)) -> Bone:
+def floor(height: float = 0.0, motion: RigidMotion | None = None, normal=(0, 0, 1)) -> Bone:
     """All below z = ``height`` [mm]; its surface is not asked."""
     return Bone("floor", BALL, motion, solid=HalfSpace((0, 0, height), normal))
 
 
-def gridded(grid: Grid, motion: Rotation | None) -> Bone:
+def gridded(grid: Grid, motion: RigidMotion | None) -> Bone:
     body = Bone("ball", BALL, motion)
     vars(body)["shape"] = grid  # as if it had been read from the kept distances
     return body
@@ -59,7 +59,7 @@ def test_no_number_has_no_distance(grid, lost) -> None:
 
 def test_who_has_come_near_is_reported_in_the_frame_of_the_bone() -> None:
     random = np.random.default_rng(2)
-    pose = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+    pose = RigidMotion((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
     points, asked_at = random.normal(size=(200, 3)), random.normal(size=(200, 3)) - [9, 1, -4]
     clear = random.uniform(0, 25, 200)
     clear[:3] = np.inf
@@ -75,7 +75,7 @@ def test_who_has_come_near_is_reported_in_the_frame_of_the_bone() -> None:
 def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
     # Points that wander while the ball turns about an axis beside it: after each step those asked are all that are inside.
     random = np.random.default_rng(3)
-    turn = Rotation((0, 1, 1), (40, 0, 0), (0.0, 60.0), (0.0, 3.0))
+    turn = RigidMotion((0, 1, 1), (40, 0, 0), (0.0, 60.0), (0.0, 3.0))
     body = gridded(grid, turn) if kind == "grid" else Bone("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
     points = 60 * random.normal(size=(3000, 3))
     points = points[body.shape.sample(points).distance > 0]
@@ -94,7 +94,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
 
 
 def test_a_vertex_takes_the_shortest_path_out() -> None:
-    ball = Bone("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
+    ball = Bone("ball", BALL, RigidMotion((1, 0, 0), None, (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
     rest = np.array([[40.0, 0, 0], [40, 5, 0], [80, 0, 0], [40, 0, 5]])
     obstacle = collision.CollidingBone(ball, rest, np.array([True, True, True, False]), 0.0)
     obstacle.move(1)

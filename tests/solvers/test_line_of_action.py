@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation as Turn
 from fem_reference.cli import main
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone, Joint
@@ -30,7 +30,7 @@ from fem_reference.studies import execution, workflow
 
 pytestmark = pytest.mark.slow
 
-SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
+SWING = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 
 
 def bar(motion=SWING, points: int = 41, bottom=None) -> MuscleProblem:
@@ -92,7 +92,7 @@ def test_a_straight_line_is_between_ends_that_go_with_their_bones() -> None:
 
 
 def test_via_points_go_with_their_bones() -> None:
-    given = bar(bottom=Translation((0, 1, 0), (0.0, 10.0), (0.0, 3.0)))
+    given = bar(bottom=RigidMotion((0, 1, 0), None, (0.0, 10.0), (0.0, 3.0)))
     outcome, frames = solved(given, via=[{"at": 0.25, "bone": "bottom"}, {"at": 0.5, "bone": "top"}])
     assert outcome.message == "2 lines, straight, through 2 via-points; no surface"
     low, high = given.fibres.points[20], given.fibres.points[61]  # the middles of both fibres
@@ -151,7 +151,7 @@ def test_what_moves_as_a_whole_keeps_its_lengths(obstacle) -> None:
 
 def test_a_cylinder_is_wrapped_where_the_line_comes_to_it() -> None:
     """A cylinder beside the lines, of which one is pulled over: straight before, longer than straight after."""
-    given = bar(Translation((0, 1, 0), (0.0, 10.0), (0.0, 20.0)))
+    given = bar(RigidMotion((0, 1, 0), None, (0.0, 10.0), (0.0, 20.0)))
     roll = {"bone": "bottom", "cylinder": {"start": "0, 14, 15 mm", "end": "10, 14, 15 mm", "radius": "5 mm"}}
     outcome, frames = solved(given, obstacle=[roll])
     assert outcome.message == "2 lines, straight or around the cylinder on bottom; no surface"
@@ -180,7 +180,7 @@ def test_an_end_inside_an_obstacle_is_refused_at_rest_and_an_outcome_later() -> 
         InputError, match=r"obstacle\[0\]: got a fixed point of line 0 2 mm inside, want an obstacle with all"
     ):
         solved(bar(), obstacle=[{"bone": "bottom", "sphere": inside}])
-    down = Translation((0, 0, -1), (0.0, 10.0), (0.0, 20.0))
+    down = RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 20.0))
     outcome, frames = solved(bar(down), obstacle=[{"bone": "bottom", "sphere": inside | {"centre": "5, 5, 12 mm"}}])
     assert outcome.status == "diverged"
     assert outcome.message == "frame 10: a fixed point of line 0 2 mm inside; a smaller radius may help"
@@ -383,7 +383,7 @@ def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
 
 def test_the_ends_are_attached_by_the_bones_of_the_nearest_attachments() -> None:
     given = bar()
-    spare = Bone("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
+    spare = Bone("spare", given.bones[0].surface, RigidMotion((1, 0, 0), None, (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))
     assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)
 
@@ -393,7 +393,7 @@ HILL = {"max_force": "500 N", "fibre_share": 0.4, "pennation": "20 deg"}
 
 def test_lines_pull_as_hills_muscles_of_their_lengths() -> None:
     """Two lines of 30 mm share the force; as one of them becomes longer it pulls more than one that slackens."""
-    pull = Translation((0, 0, 1), (0.0, 10.0), (0.0, 6.0))
+    pull = RigidMotion((0, 0, 1), None, (0.0, 10.0), (0.0, 6.0))
     given = bar(pull)
     _, frames = solved(given, hill=HILL)
     alone = parse(
@@ -408,7 +408,7 @@ def test_lines_pull_as_hills_muscles_of_their_lengths() -> None:
         assert frame.scalars["fibre_length_mean"] == pytest.approx(fibre, rel=1e-9)
     _, tired = solved(given, hill=HILL | {"activation": 0.2})
     assert tired[1].scalars["muscle_force"] < 0.5 * frames[1].scalars["muscle_force"]
-    _, slack = solved(bar(Translation((0, 0, -1), (0.0, 10.0), (0.0, 20.0))), hill=HILL)
+    _, slack = solved(bar(RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 20.0))), hill=HILL)
     assert slack[-1].scalars["muscle_force"] == 0
     assert "muscle_force" not in solved(given)[1][0].scalars
 
@@ -421,7 +421,7 @@ def exerted(frame: Frame, bone: str) -> tuple[np.ndarray, np.ndarray]:
     return force, moment
 
 
-PULLED = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))  # lines get longer
+PULLED = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))  # lines get longer
 
 
 def alone(given: MuscleProblem, line: int) -> MuscleProblem:
@@ -483,7 +483,7 @@ def lines_of(given: MuscleProblem, settings: dict) -> line_of_action.Shortest:
 def test_the_moment_is_the_force_times_minus_the_slope_of_the_length(obstacle) -> None:
     """Virtual work, around obstacles too: central differences of the lengths over 2e-4 rad, whose error is of the order of 1e-8."""
     step, middle = 1e-4, 0.55
-    turn = Rotation((1, 0, 0), (5, 25, 15), (0.0, 1.0, 2.0, 3.0), (0.0, -middle - step, -middle, -middle + step))
+    turn = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 1.0, 2.0, 3.0), (0.0, -middle - step, -middle, -middle + step))
     for line in (0, 1):
         given = alone(replace(bar(turn, points=2001), frames=(0, 1, 2, 3)), line)
         shares = {"fibre_share": 0.9, "pennation": "0 deg", "activation": 0.5}
@@ -530,7 +530,7 @@ def alike(given: MuscleProblem, turn: np.ndarray, shift: np.ndarray, factor: flo
 
     def moved(bone: Bone) -> Bone:
         motion = bone.motion
-        if isinstance(motion, Rotation):
+        if motion is not None and motion.centre is not None:
             axis, (x, y, z) = turn @ motion.axis, there(np.array(motion.centre))
             motion = replace(motion, axis=tuple(axis), centre=(x, y, z))
         return replace(bone, surface=bone.surface.moved_to(there(bone.surface.points)), motion=motion)

@@ -9,7 +9,7 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Joint
@@ -22,7 +22,7 @@ HINGE = (5, 25, 15)
 START, END = (5.0, 3, 0), (7.0, 2, 30)
 ANGLES = (-0.55, -0.3, 0.1, 0.37, 0.7)
 # Frame n is at 0.1 (n - 10) rad.
-SWING = Rotation((1, 0, 0), HINGE, (0.0, 20.0), (-1.0, 1.0))
+SWING = RigidMotion((1, 0, 0), HINGE, (0.0, 20.0), (-1.0, 1.0))
 COORDINATE = "/jointset/hinge/hinge_coord_0"
 
 

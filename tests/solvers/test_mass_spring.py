@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
@@ -26,7 +26,7 @@ NOTHING = np.zeros((0, 3))
 FREE = PrescribedPath(np.zeros(0, np.int64), NOTHING, NOTHING)
 STIFFNESS, MASS = 0.3, 2e-6  # N/mm, tonne
 USUAL = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "0.02 N s/m"}
-BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
+BEND = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
 
 
 def network(springs, lengths, count: int, damping: float = 0.0, gravity=(0.0, 0.0, 0.0)) -> Network:
@@ -79,7 +79,7 @@ def test_the_stable_time_step_is_safe_for_any_shape() -> None:
     assert mass_spring.stable_time_step(springs, np.arange(12)) == math.inf
 
 
-def bar(top: Rotation | Translation | None, frames=(0, 5, 10), bottom=None) -> MuscleProblem:
+def bar(top: RigidMotion | None, frames=(0, 5, 10), bottom=None) -> MuscleProblem:
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": bottom, "top": top}, (), frames)
 
 
@@ -119,7 +119,7 @@ def test_surface_and_fibres_go_with_the_tetrahedra() -> None:
 
 
 def test_moved_with_both_its_bones_a_muscle_comes_to_rest_undeformed() -> None:
-    turn = Rotation((0, 1, 0), (0, 0, -20), (0.0, 5.0), (0.0, 0.5))
+    turn = RigidMotion((0, 1, 0), (0, 0, -20), (0.0, 5.0), (0.0, 0.5))
     given = bar(turn, (0, 60), turn)
     outcome, frames = solved(given)
     # Swinging dies out with c / 2 m = 150 / s or more and 1.1 s are left: rounding of the forces.
@@ -163,7 +163,7 @@ def test_every_setting_is_felt(change) -> None:
 
 def test_bones_keep_masses_out() -> None:
     """A soft bar that hangs sideways between its ends sags onto a plane that comes up, in the end above where they are fixed."""
-    lift = Translation((0, 1, 0), (0.0, 40.0), (0.0, 3.5))
+    lift = RigidMotion((0, 1, 0), None, (0.0, 40.0), (0.0, 3.5))
     floor = Bone("floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0)))
     given = replace(bar(None, (0, 40)), bones=(floor,))
     soft = {"stiffness": "0.01 N/mm", "gravity": "0, -40, 0 m/s^2", "damping": "0.001 N s/m"}
@@ -195,7 +195,7 @@ def test_above_the_stable_time_step_it_diverges_and_says_why() -> None:
 
 
 def test_a_muscle_torn_apart_is_an_outcome() -> None:
-    leap = Translation((0, 0, 1), (0.0, 4.0, 5.0), (0.0, 0.0, math.inf))
+    leap = RigidMotion((0, 0, 1), None, (0.0, 4.0, 5.0), (0.0, 0.0, math.inf))
     with np.errstate(invalid="ignore"):
         outcome, frames = solved(bar(leap), time_step="1 ms", stiffness="0.001 N/mm")
     assert outcome.status == "diverged"
@@ -212,7 +212,7 @@ def test_a_muscle_spread_too_wide_is_an_outcome() -> None:
 
 def pressed(travel: float) -> MuscleProblem:
     """A soft bar of two cells, 30 mm long, whose upper end goes down by ``travel`` [mm] faster than the middle follows."""
-    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, travel))
+    down = RigidMotion((0, 0, -1), None, (0.0, 1.0), (0.0, travel))
     return shapes.bar((1, 1, 2), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
 
 

@@ -8,7 +8,7 @@ import shapes
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, check_closed, enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
@@ -25,9 +25,9 @@ USUAL = {
     "bending": 0.9,
 }
 SETTINGS = pbd.PbdSettings(**USUAL)
-TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+TURN = RigidMotion((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
 CONTACT = {"gap": "0 mm", "stiffness": 1.0}
-SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
+SWING = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
 
 
 def spindle():
@@ -136,7 +136,7 @@ def test_attached_vertices_go_with_their_bone():
 def test_independent_of_where_the_world_is():
     # Roundings of 1e-14 in the place of the whole grow over 150 steps; 1e-6 of the size is far below what is looked at.
     x, y, z = TURN[:3, :3] @ SWING.axis
-    moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
+    moved = RigidMotion((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.amounts)
     _, here = run(attached_setup(None, SWING, last=50))
     _, there = run(attached_setup(None, moved, last=50, pose=TURN))
     np.testing.assert_allclose(there[50], apply(TURN, here[50]), atol=60e-6)
@@ -163,7 +163,7 @@ def ball_against(last, back=None):
     setup = attached_setup(None, None, last=last)
     frames, distances = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
     ball = Bone(
-        "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, distances), solid=Sphere((20, 0, 0), 8.0)
+        "ball", shapes.sphere(0, 8.0), RigidMotion((-1, 0, 0), None, frames, distances), solid=Sphere((20, 0, 0), 8.0)
     )
     return Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
 
@@ -248,7 +248,7 @@ def test_a_turned_scene_has_the_same_fibres_at_its_edges():
     edges = pbd.hinges_of(given.surface.triangles)[:, :2]
     here = pbd.along_fibres(given.surface.points, edges, given.fibres)
     for angle in np.linspace(0.1, 3, 20):
-        pose = Rotation((1, 2, 3), (50, -40, 70), (0.0, 1.0), (0.0, angle)).pose(1)
+        pose = RigidMotion((1, 2, 3), (50, -40, 70), (0.0, 1.0), (0.0, angle)).pose(1)
         fibres = Polylines(apply(pose, given.fibres.points), given.fibres.offsets)
         there = pbd.along_fibres(apply(pose, given.surface.points), edges, fibres)
         np.testing.assert_allclose(there, here, rtol=0, atol=1e-12)
@@ -258,7 +258,7 @@ def test_with_fibres_independent_of_where_the_world_is():
     # As without them: roundings of 1e-14 in the place of the whole grow over 150 steps.
     here = kinked()
     x, y, z = TURN[:3, :3] @ SWING.axis
-    moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
+    moved = RigidMotion((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.amounts)
     fibres = Polylines(apply(TURN, here.fibres.points), here.fibres.offsets)
     there = MuscleProblem(**vars(here) | vars(attached_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
     states = [run(given, anisotropy=1.0)[1][50] for given in (here, there)]
@@ -306,7 +306,9 @@ def test_frames_wanted_and_cost():
 
 
 def test_positions_that_are_no_number_are_an_outcome():
-    outcome, frames = run(attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
+    outcome, frames = run(
+        attached_setup(None, RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan)))
+    )
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
     assert list(frames) == [0, 1, 2]
@@ -315,7 +317,7 @@ def test_positions_that_are_no_number_are_an_outcome():
 
 
 def test_a_body_torn_apart_is_an_outcome():
-    leap = Rotation((1, 0, 0), (0, 1e5, 0), (0.0, 3.0, 4.0), (0.0, 0.0, 1.0))
+    leap = RigidMotion((1, 0, 0), (0, 1e5, 0), (0.0, 3.0, 4.0), (0.0, 0.0, 1.0))
     outcome, frames = run(attached_setup(leap, leap))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 4: the muscle is spread over ")
@@ -324,7 +326,7 @@ def test_a_body_torn_apart_is_an_outcome():
 
 def test_a_body_turned_inside_out_is_an_outcome():
     # One bone has the lower half attached and one the upper, which goes by a whole length of 60 mm through the lower one.
-    setup = attached_setup(None, Translation((0, 0, -1), (0.0, 3.0), (0.0, 60.0)))
+    setup = attached_setup(None, RigidMotion((0, 0, -1), None, (0.0, 3.0), (0.0, 60.0)))
     upper = setup.surface.points[:, 2] > 0
     attached = tuple(
         AttachedVertices(bone.name, bone, np.flatnonzero(mask))
@@ -342,7 +344,7 @@ def pressed(pose, spacing):
     surface = shapes.sphere(2, 8.0)
     surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))
     x, y, z = -pose[:3, 0]
-    ball = Bone("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
+    ball = Bone("ball", surface, RigidMotion((x, y, z), None, (0.0, 40.0), (0.0, 12.0)))
     vars(ball)["shape"] = build(surface, spacing, 6.0)  # as if it had been read from the kept distances
     _, frames = run(Setup(setup.surface, (ball,), setup.attached, setup.frames, None), collision=CONTACT)
     return apply(np.linalg.inv(pose), frames[16])

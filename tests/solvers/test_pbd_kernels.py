@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fem_reference.foundations.mesh import TET_FACES, Surface
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.solvers import pbd_kernels as kernels
 from fem_reference.solvers.compiled_kernels import kept_code
 from fem_reference.solvers.pbd import PbdConstraints, hinges_of
 
 TET = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+TURN = RigidMotion((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
 
 
 def icosahedron():

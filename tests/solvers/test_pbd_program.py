@@ -9,7 +9,7 @@ import shapes
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 USUAL = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64}
 SETTINGS = pbd_program.ProgramSettings(**USUAL)
-SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
+SWING = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
 
@@ -132,7 +132,9 @@ def test_who_marches_too_far_ends_at_its_start():
 
 def test_the_motions_of_a_bone_add_up():
     # As the program adds up: 0.9 mm a hundred times are not 90 mm.
-    bone = pbd_program.VoxelBone(Bone("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
+    bone = pbd_program.VoxelBone(
+        Bone("bone", cube(8.0), RigidMotion((0, -1, 0), None, (0.0, 100.0), (0.0, 90.0))), 1, 0
+    )
     height = 0.0
     for frame in range(1, 101):
         bone.move(frame)
@@ -142,7 +144,7 @@ def test_the_motions_of_a_bone_add_up():
 
 
 def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
-    bone = pbd_program.VoxelBone(Bone("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
+    bone = pbd_program.VoxelBone(Bone("bone", cube(8.0), RigidMotion((0, 0, 1), None, (0.0, 2.0), (0.0, 3.0))), 8, 0)
     starts, goals = np.array([[4.0, 4, 9], [4, 4, 12]]), np.array([[4.0, 5, 8], [4, 5, 12]])
     bone.move(1)  # now its upper face is at 9.5, and the first vertex inside, wherever it goes
     np.testing.assert_allclose(pbd_program.collided(starts, goals, [bone]), [[4, 4, 10.5], [4, 5, 12]])
@@ -196,7 +198,7 @@ def test_fibres_leave_edges_across_them_stiff():
 @pytest.mark.parametrize(("key", "value"), [("sub_iterations", 1), ("damping", 0.5), ("bending", 0), ("voxels", None)])
 def test_every_setting_is_felt(key, value):
     # The cubes are squeezed into the ball.
-    squeeze = Translation((0, 0, -1), (0.0, 10.0), (0.0, 10.0))
+    squeeze = RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 10.0))
     usual, changed = (run(attached_setup(None, squeeze), **changes)[1][10] for changes in ({}, {key: value}))
     assert np.abs(changed - usual).max() > 1e-3
 
@@ -211,7 +213,9 @@ def test_cost_is_reported():
 
 
 def test_positions_that_are_no_number_are_an_outcome():
-    outcome, frames = run(attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
+    outcome, frames = run(
+        attached_setup(None, RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan)))
+    )
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
     assert list(frames) == [0, 1, 2]

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import rbf_muscle
@@ -32,7 +32,7 @@ def test_a_muscle_whose_bones_move_alike_moves_with_them() -> None:
 
 
 def test_the_volume_is_kept_and_lost_without_it() -> None:
-    pull = Translation((0, 0, 1), (0.0, 10.0), (0.0, 15.0))
+    pull = RigidMotion((0, 0, 1), None, (0.0, 10.0), (0.0, 15.0))
     setup = attached_setup(None, pull, last=10)
     rest = enclosed_volume(setup.surface.points, setup.surface.triangles)
     kept, lost = (
@@ -45,7 +45,7 @@ def test_the_volume_is_kept_and_lost_without_it() -> None:
 def test_bones_are_avoided() -> None:
     """A ball of 8 mm comes 10 mm into the side of the muscle, whose half width is 20 mm."""
     surface, ball = muscle(), shapes.sphere(2, 8.0)
-    coming = Translation((-1, 0, 0), (0.0, 10.0), (0.0, 12.0))
+    coming = RigidMotion((-1, 0, 0), None, (0.0, 10.0), (0.0, 12.0))
     place = np.array([30.0, 0.0, 0.0])
     bone = Bone("ball", ball.moved_to(ball.points + place), coming, solid=Sphere((30.0, 0.0, 0.0), 8.0))
     still = attached_setup(None, None, surface, last=10)
@@ -79,7 +79,7 @@ def test_a_scene_turned_and_scaled_is_the_same_turned_and_scaled() -> None:
 
     given = muscle(noise=0.5)
     x, y, z = there(np.array(SWING.centre))
-    swing = Rotation(tuple(turn @ SWING.axis), (x, y, z), SWING.frames, SWING.angles)
+    swing = RigidMotion(tuple(turn @ SWING.axis), (x, y, z), SWING.frames, SWING.amounts)
     setup = attached_setup(None, SWING, given, last=4)
     surface = given.moved_to(there(given.points))
     bones = tuple(Bone(bone.name, surface, bone.motion and swing) for bone in setup.bones)
@@ -93,7 +93,7 @@ def test_a_scene_turned_and_scaled_is_the_same_turned_and_scaled() -> None:
 
 
 def test_back_where_it_began_it_is_at_rest() -> None:
-    there_and_back = Rotation((1, 0, 0), (0, 20, -10), (0.0, 5.0, 10.0, 20.0), (0.0, 0.3, 0.0, 0.0))
+    there_and_back = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 5.0, 10.0, 20.0), (0.0, 0.3, 0.0, 0.0))
     setup = attached_setup(None, there_and_back, last=20)
     _, frames = run(setup)
     assert_allclose(frames[0], setup.surface.points)

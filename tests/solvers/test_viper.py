@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, enclosed_volume
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
@@ -17,9 +17,9 @@ from fem_reference.solvers import viper
 from fem_reference.solvers.viper_kernels import turned, volumes
 
 LENGTH = 30.0
-SWING = Rotation((1, 0, 0), (5, 5, -10), (0.0, 10.0), (0.0, 0.5))
-TWIST = Rotation((0, 0, 1), (5, 5, 0), (0.0, 10.0), (0.0, 1.0))
-PULL = Translation((0, 0, 1), (0.0, 10.0), (0.0, 0.21 * LENGTH))
+SWING = RigidMotion((1, 0, 0), (5, 5, -10), (0.0, 10.0), (0.0, 0.5))
+TWIST = RigidMotion((0, 0, 1), (5, 5, 0), (0.0, 10.0), (0.0, 1.0))
+PULL = RigidMotion((0, 0, 1), None, (0.0, 10.0), (0.0, 0.21 * LENGTH))
 USUAL = {"points": 9, "iterations": 20, "stretch": 1.0, "bending": 0.5, "volume": 1.0, "bundle": 0.5}
 
 
@@ -100,7 +100,7 @@ def test_without_bending_frames_follow_their_segments_alone() -> None:
 
 def test_a_bent_rod_is_symmetric() -> None:
     """Both ends turned in opposite directions about the middle of the rod, which is in the plane of symmetry."""
-    one, other = (Rotation((1, 0, 0), (5, 5, z), (0.0, 10.0), (0.0, turn)) for z, turn in ((0, 0.4), (LENGTH, -0.4)))
+    one, other = (RigidMotion((1, 0, 0), (5, 5, z), (0.0, 10.0), (0.0, turn)) for z, turn in ((0, 0.4), (LENGTH, -0.4)))
     model, _ = solved(bar(one, other), iterations=400)
     points = model.points[0] - [5, 5, LENGTH / 2]
     assert_allclose(points[::-1] * [1, 1, -1], points, atol=1e-6)
@@ -129,7 +129,7 @@ def scene(given: MuscleProblem, pose: np.ndarray, scale: float, order: np.ndarra
     class Turned:
         """The motion of a bone as this scene sees it."""
 
-        def __init__(self, motion: Rotation) -> None:
+        def __init__(self, motion: RigidMotion) -> None:
             self.motion = motion
 
         def pose(self, frame: float) -> np.ndarray:
@@ -152,7 +152,7 @@ def scene(given: MuscleProblem, pose: np.ndarray, scale: float, order: np.ndarra
 def test_a_scene_turned_scaled_and_renumbered_has_the_same_answer() -> None:
     given, random = bar(rods=16), np.random.default_rng(4)
     order, rods = random.permutation(len(given.surface.points)), random.permutation(16)
-    pose = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+    pose = RigidMotion((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
     (_, frames), (_, again) = solved(given), solved(scene(given, pose, 3.0, order, rods))
     # Rods on a grid are as near to several others, which have no share: rounding changes who they are.
     assert_allclose(again[-1].surface, apply(pose, 3 * frames[-1].surface[order]), atol=1e-6)
@@ -162,7 +162,7 @@ def test_a_scene_turned_scaled_and_renumbered_has_the_same_answer() -> None:
 def test_bones_are_avoided() -> None:
     """A ball of 6 mm comes 9 mm from far away towards the middle of the bar."""
     ball, place = shapes.sphere(2, 6.0), np.array([25.0, 5.0, 15.0])
-    coming = Translation((-1, 0, 0), (0.0, 10.0), (0.0, 12.0))
+    coming = RigidMotion((-1, 0, 0), None, (0.0, 10.0), (0.0, 12.0))
     bone = Bone("ball", ball.moved_to(ball.points + place), coming, solid=Sphere((25.0, 5.0, 15.0), 6.0))
     given = bar(None, None, 16)
     given = replace(given, bones=(*given.bones, bone))

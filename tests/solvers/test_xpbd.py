@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume, vertex_areas
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
@@ -225,7 +225,7 @@ def test_bones_never_pull():
     np.testing.assert_allclose(velocities, away)
 
 
-SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 20.0), (0.0, 0.4))
+SWING = RigidMotion((1, 0, 0), (0, 20, -10), (0.0, 20.0), (0.0, 0.4))
 
 
 def muscle(motion, last=10, ball=None) -> Setup:
@@ -280,7 +280,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
     # A bone pulls for 20 frames and rests for 40; a hundred times the mass of muscle makes the time step short beside what moves.
     # Measured: apart by 0.002 mm where the muscle moved by 3 mm; 1 % is allowed.
     soft = {"volume": "100 kPa", "collision": None, "damping": "60 1/s", "density": "100000 kg/m3"}
-    setup = muscle(Translation((0, 0, 1), (0.0, 20.0), (0.0, 3.0)), last=60)
+    setup = muscle(RigidMotion((0, 0, 1), None, (0.0, 20.0), (0.0, 3.0)), last=60)
     loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     ends = [
         run(setup, sub_steps=steps, sweeps=sweeps, **soft)[1][60][loose] for steps, sweeps in ((4, 8), (8, 8), (4, 16))
@@ -292,7 +292,9 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
 
 
 def test_bones_are_obstacles():
-    ball = Bone("ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0))
+    ball = Bone(
+        "ball", icosahedron(), RigidMotion((-1, 0, 0), None, (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0)
+    )
     setup = muscle(None, last=20, ball=ball)
     loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     depths = []
@@ -334,7 +336,7 @@ def test_another_clock_than_the_scenes_is_reported():
 
 
 def test_positions_that_are_no_number_are_an_outcome():
-    outcome, frames = run(muscle(Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
+    outcome, frames = run(muscle(RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
     assert list(frames) == [0, 1, 2]

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Joint
@@ -21,15 +21,15 @@ from fem_reference.solvers.common.lines import nearest_bones
 
 pytestmark = pytest.mark.slow  # tetrahedra of a bar
 
-SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
+SWING = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 ANGLES = {0: 0.0, 5: 0.6, 10: 1.2}
 ON_TOP = {"at": 0.5, "bone": "bottom", "joint": "hinge"}
 
 
-def hinged(sign: float = 1.0, swing: Rotation = SWING) -> MuscleProblem:
+def hinged(sign: float = 1.0, swing: RigidMotion = SWING) -> MuscleProblem:
     """A bar of 30 mm with a straight line beside its middle; its top turns, counted by ``sign``."""
     given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": swing}, (), tuple(ANGLES))
-    slope = sign * swing.angles[-1] / swing.frames[-1]
+    slope = sign * swing.amounts[-1] / swing.frames[-1]
     line = np.column_stack([np.full(21, 5.0), np.full(21, 3.0), np.linspace(0, 30, 21)])
     top = next(bone for bone in given.bones if bone.name == "top")
     joint = Joint("hinge", top, np.array([sign, 0, 0]), np.array(SWING.centre), lambda frame: slope * frame)
@@ -117,7 +117,7 @@ def test_a_point_left_out_pulls_at_no_bone() -> None:
     """Where the point on the bone below is left out, the straight line pulls both bones along itself; where it is passed, the bone
     above is pulled towards the point. Forces balance at every frame.
     """
-    lengthens = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))
+    lengthens = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, -0.6))
     hill = {"max_force": "500 N", "fibre_share": 0.9, "pennation": "0 deg"}
     via = {"at": 0.5, "bone": "bottom", "joint": "hinge", "within": ["-0.4 rad", "-0.2 rad"]}
     frames = solved(hinged(swing=lengthens), via, hill=hill)

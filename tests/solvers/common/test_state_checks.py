@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble, first_trouble
 
 REST = shapes.sphere(1, 10.0)
 NONE = np.zeros(0, np.int64)
-TURN = Rotation((1, 2, 3), (5, -4, 700), (0.0, 1.0), (0.0, 2.0)).pose(1)
+TURN = RigidMotion((1, 2, 3), (5, -4, 700), (0.0, 1.0), (0.0, 2.0)).pose(1)
 
 
 def trouble(points, rest, attached) -> Trouble | None:

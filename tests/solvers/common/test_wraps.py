@@ -6,14 +6,14 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 pytestmark = pytest.mark.slow  # tetrahedra of a bar
 
-SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
+SWING = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 BALL = {"bone": "top", "sphere": {"centre": "5, 5, 15 mm", "radius": "4 mm"}}
 EGG = {"bone": "top", "ellipsoid": {"centre": "5, 5, 15 mm", "radii": ["4 mm"] * 3, "turn": "10, 0, 30 deg"}}
 RING = {"bone": "top", "torus": {"centre": "5, 5, 15 mm", "axis": [0, 1, 0], "radius": "6 mm", "tube": "2 mm"}}

@@ -8,7 +8,7 @@ import shapes
 
 from fem_reference import effects
 from fem_reference.assessment.run_checks import RunCheck, of_muscle
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin
 from fem_reference.problems.muscle import MuscleProblem
@@ -32,7 +32,7 @@ BALANCES = {f"{kind}s that bones do not carry" for kind in ("force", "moment")}
 
 def bar(*acting: str, springs: bool = False) -> MuscleProblem:
     """A bar whose top turns about an axis beside it, under the loads ``acting``; attached by springs at its bottom, or exactly."""
-    turn = Rotation((1, 0.5, 0), (5, -10, 20), (0.0, 10.0), (0.0, 0.5))
+    turn = RigidMotion((1, 0.5, 0), (5, -10, 20), (0.0, 10.0), (0.0, 0.5))
     problem = shapes.bar((2, 2, 3), (10, 10, 40), {"bottom": None, "top": turn}, FLESH, (0, 5, 10))
     low, high = problem.attached
     if springs:

@@ -9,7 +9,7 @@ import shapes
 from fem_reference import effects
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import TetMesh
-from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import Settings, processes
@@ -24,8 +24,8 @@ MUSCLE = (
 )
 
 
-def turning(angle: float, axis=(0, 0, 1), centre=(5.0, 5.0, 0.0), last=10.0) -> Rotation:
-    return Rotation(axis, centre, (0.0, last), (0.0, angle))
+def turning(angle: float, axis=(0, 0, 1), centre=(5.0, 5.0, 0.0), last=10.0) -> RigidMotion:
+    return RigidMotion(axis, centre, (0.0, last), (0.0, angle))
 
 
 def solved(problem, **settings) -> tuple[Outcome, list[Frame]]:
@@ -70,7 +70,7 @@ def test_torsion_stiffness_of_a_square_bar() -> None:
 @pytest.fixture(scope="module")
 def bent():
     """A bar bent by 0.6 rad and back: (problem, outcome, frames) on one rank."""
-    motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0, 20.0), (0.0, 0.6, 0.0))
+    motion = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0, 20.0), (0.0, 0.6, 0.0))
     problem = shapes.bar((2, 2, 6), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 5, 10, 15, 20))
     return problem, *solved(problem, ranks=1)
 
@@ -96,7 +96,7 @@ def test_ranks_change_the_time_and_not_the_answer(bent) -> None:
 
 @pytest.mark.usefixtures("all_cores")
 def test_ranks_do_not_change_what_stabilises_pressures() -> None:
-    motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.6))
+    motion = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.6))
     problem = shapes.bar((2, 2, 4), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 10))
     (_, alone), (_, shared) = (solved(problem, ranks=ranks, element="P1/P1") for ranks in (1, 2))
     assert shared[-1].points == pytest.approx(alone[-1].points, abs=1e-9)

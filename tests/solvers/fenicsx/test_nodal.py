@@ -9,7 +9,7 @@ import small
 from acting import make
 
 from fem_reference.foundations.mesh import TetMesh
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
 from fem_reference.problems.shapes import box
@@ -54,7 +54,7 @@ def test_a_block_stretched_by_a_half_with_free_sides(fem_lab, element: str) -> N
 @pytest.fixture(scope="module")
 def turned(fem_lab, all_cores):  # noqa: ARG001
     """A bar bent by 0.6 rad, on one rank and on two: (problem, frames, frames)."""
-    motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.6))
+    motion = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.6))
     problem = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": motion}, MATRIX, (0, 10))
     both: list[list[Frame]] = []
     for ranks in (1, 2):

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from fem_reference import effects
 from fem_reference.foundations import limits
-from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Follows, Rest, Turn
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def twisted(angle: float, frames: tuple[float, ...]) -> Body:
     """A bar whose end turns by ``angle`` [rad] from frame 0 to 1."""
     mesh = shapes.box((1, 1, 3), (1.0, 1.0, 3.0), "hexahedron")
-    turn = Follows(Rotation((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1.0), (0.0, angle)).pose)
+    turn = Follows(RigidMotion((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1.0), (0.0, angle)).pose)
     fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (0, 1, 2), turn)
     return Body(mesh, flesh("Q2/Q1"), fixed, frames)
 
@@ -48,7 +48,7 @@ WHIRLED = lambda points, frame: Turn((0, 0, 1), 2 * np.pi, (0.5, 0.5, 0.0))(poin
 def knotted(*knots: tuple[float, float]) -> Follows:
     """A turn by angles [rad] at frames."""
     frames, angles = zip(*knots, strict=True)
-    return Follows(Rotation((0, 0, 1), (0.5, 0.5, 0.0), frames, angles).pose)
+    return Follows(RigidMotion((0, 0, 1), (0.5, 0.5, 0.0), frames, angles).pose)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_a_whole_turn_within_a_load_step_is_not_left_out(head, last, step, sessi
 
 def test_drag_feels_a_way_there_and_back_within_a_load_step(session) -> None:
     """A bar that is moved there and back within one step of its own is behind afterwards."""
-    slide = Follows(Translation((1, 0, 0), (0.0, 0.4, 0.8), (0.0, 1.0, 0.0)).pose)
+    slide = Follows(RigidMotion((1, 0, 0), None, (0.0, 0.4, 0.8), (0.0, 1.0, 0.0)).pose)
     acting = (*flesh("Q2/Q1"), effects.make("damping", coefficient=1e-3))
     body = replace(twisted(0.0, (0.0, 0.8)), effects=acting, interval=1.0)
     body = replace(body, prescribed=(replace(body.prescribed[0], path=slide),))
@@ -92,7 +92,7 @@ def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) ->
     stabilised too, whose energy is a part of it.
     """
     mesh = shapes.box((2, 2, 4), (1.0, 1.0, 3.0), "tetrahedron")
-    turn = Follows(Rotation((0, 1, 0), (0.5, 0.5, 1.5), (0.0, 1.0), (0.0, 0.6)).pose)
+    turn = Follows(RigidMotion((0, 1, 0), (0.5, 0.5, 1.5), (0.0, 1.0), (0.0, 0.6)).pose)
     fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (0, 1, 2), turn)
     gaps = []
     for steps in (4, 8):

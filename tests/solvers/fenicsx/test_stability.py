@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from fem_reference import effects
 from fem_reference.effects import Effect
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
@@ -156,7 +156,7 @@ def test_ranks_count_alike() -> None:
     # A bar of 2 x 2 x 20 mm, shortened by 2 per cent between clamped ends, against Euler's 4 pi^2 / 12 / 100 = 3.3 per cent.
     found = {}
     for ranks in (1, 2):
-        moved = {"bottom": None, "top": Translation((0, 0, -1), (0.0, 10.0), (0.0, 1.4))}
+        moved = {"bottom": None, "top": RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 1.4))}
         problem = bodies.bar((1, 1, 10), (2, 2, 20), moved, flesh("P2/P1"), (0, 5, 10))
         frames: list[Frame] = []
         outcome = fenicsx.solve(problem, Settings(ranks=ranks, first_step=100.0), frames.append)

@@ -10,7 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 from fem_reference import effects
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
@@ -236,7 +236,7 @@ def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:
 @pytest.mark.usefixtures("all_cores")
 def test_ranks_agree_on_what_is_outside(session) -> None:  # noqa: ARG001 - it skips where there is no FEniCSx
     flesh = (effect("neo_hooke", mu="10 kPa"), effect("incompressible", bulk="1 MPa"), ACTIVE)
-    pull = Translation((0.0, 0.0, 1.0), (0.0, 1.0), (0.0, 17.0))
+    pull = RigidMotion((0.0, 0.0, 1.0), None, (0.0, 1.0), (0.0, 17.0))
     problem = bodies.bar((1, 1, 2), (10, 10, 20), {"bottom": None, "top": pull}, flesh, (0, 1))
     problem = replace(problem, fibre=ByCell(np.tile([0.0, 0.0, 1.0], (len(problem.mesh.tets), 1))))
     found = []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from tests.solvers.fenicsx.test_init import MUSCLE, bent, solved  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.slow
@@ -47,7 +47,7 @@ def test_a_pose_that_was_solved_before_needs_no_iteration(bent) -> None:  # noqa
 
 def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> None:
     # The top is turned through half a circle about an axis within the bar: no admissible state, and no step is small enough.
-    motion = Rotation((1, 0, 0), (5, 5, 9), (0.0, 1.0, 10.0), (0.0, 0.02, 3.1))
+    motion = RigidMotion((1, 0, 0), (5, 5, 9), (0.0, 1.0, 10.0), (0.0, 0.02, 3.1))
     problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": motion}, MUSCLE, (0, 1, 10))
     outcome, frames = solved(problem, ranks=1, smallest_step=1.0)
     assert outcome.status in ("diverged", "inverted")
