@@ -77,7 +77,8 @@ def colour_of(i: int) -> str:
     if i == 0:
         return REFERENCE
     darker, k = divmod(i - 1, len(PALETTE))
-    return to_hex(np.array(to_rgb(PALETTE[k])) * (2 / 3) ** darker)
+    red, green, blue = (share * (2 / 3) ** darker for share in to_rgb(PALETTE[k]))
+    return to_hex((red, green, blue))
 
 
 def look_of(i: int) -> dict[str, Any]:

@@ -20,8 +20,10 @@ from PIL import Image
 
 from fem_reference.foundations.markup import exact
 from fem_reference.io import files
+from fem_reference.metrics import find
+from fem_reference.report import gallery
 from fem_reference.report.drawings import webp
-from fem_reference.report.words import duration, number, words
+from fem_reference.report.words import duration, listed, number, ratio, title_of, words
 
 # Where the facts stand in the frame of all pages (base.html), and where the command that made it.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
@@ -152,5 +154,14 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
+    environment.globals |= {
+        "find": find,
+        "greatest_distance": gallery.top,
+        "ramp": gallery.ramp,
+        "ratio": ratio,
+        "ticks": gallery.ticks,
+        "title_of": title_of,
+        "zip": zip,
+    }
+    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words, "listed": listed}
     return environment
