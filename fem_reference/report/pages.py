@@ -17,6 +17,7 @@ from typing import Any
 
 import jinja2
 from PIL import Image
+from pydantic import TypeAdapter
 
 from fem_reference.foundations.markup import exact
 from fem_reference.io import files
@@ -102,12 +103,9 @@ def read(path: Path) -> PageHead | None:
     try:
         with path.open("rb") as file:
             text = file.read(_HEAD).decode("utf-8", "ignore")
-        facts = json.loads(text.partition(_BEGIN)[2].partition(_END)[0])
-        head = PageHead(**facts | {"headlines": tuple((name, word, said) for name, word, said in facts["headlines"])})
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return TypeAdapter(PageHead).validate_json(text.partition(_BEGIN)[2].partition(_END)[0])
+    except (OSError, ValueError):
         return None
-    plain = (head.kind, head.title, head.asked, head.made, head.picture, *sum(head.headlines, ()))
-    return head if all(isinstance(one, str) for one in plain) else None
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
