@@ -13,6 +13,12 @@ _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
 _MOVED = 0.01  # of a surface's greatest motion: below it, shares of the motion have no meaning
 
 
+def greatest(values: Floats) -> float:
+    """The greatest of the finite ``values`` (f,), NaN without one."""
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if len(finite) else math.nan
+
+
 def ratio(differences: Floats, scale: Floats) -> float:
     """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), over the frames where both are known; NaN where
     the scale is 0.

@@ -7,13 +7,13 @@ rest is the share of these deviations by which the changes of its runs differ.
 
 import json
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
+from pydantic import BeforeValidator, PlainValidator, TypeAdapter
 
 from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.foundations.errors import InputError
@@ -39,6 +39,11 @@ VARIATION = 2.0
 # other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
+# Numbers in a file, which has None for one that is not finite.
+_Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+_Numbers = Annotated[
+    Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
+]
 # By sort of bar, the differences (f,) of each statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
@@ -57,9 +62,9 @@ class ErrorBar:
     metric: str
     statistic: str
     unit: str
-    values: Floats
-    parts: dict[str, float]
-    model: Floats | None = None
+    values: _Numbers
+    parts: dict[str, _Number]
+    model: _Numbers | None = None
 
     @property
     def widest(self) -> int:
@@ -191,28 +196,10 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
         table = texts.read_json(place, "the error bar of a stored run (--error-bar makes it anew)")
         if table["format"] != FORMAT or table["of"] != of:
             return None
-        numbers = tuple(int(number) for number in table["numbers"])
-        bars = tuple(_bar(row, len(numbers)) for row in table["bars"])
-        fine, coarse = (float(size) for size in table["sizes_mm"])
-        return ErrorBars(numbers, (fine, coarse), float(table["order"]), bars)
+        bars = TypeAdapter(ErrorBars).validate_python(table | {"sizes": table["sizes_mm"]})
+        for bar in bars.bars:
+            if any(one is not None and one.shape != (len(bars.numbers),) for one in (bar.values, bar.model)):
+                raise ValueError(f"the bar of {bar.metric}.{bar.statistic}")
+        return bars
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
-
-
-def _bar(row: dict[str, object], frames: int) -> ErrorBar:
-    values = np.array(_numbers(row["values"]))
-    parts, model = row["parts"], row["model"]
-    band = None if model is None else np.array(_numbers(model))
-    if any(one is not None and one.shape != (frames,) for one in (values, band)) or row["of"] not in get_args(Of):
-        raise ValueError(f"the bar of {row['metric']}.{row['statistic']}")
-    if not isinstance(parts, dict):
-        raise TypeError("no parts by name")
-    greatest = dict(zip(parts, _numbers(list(parts.values())), strict=True))
-    metric, statistic, unit = (str(row[key]) for key in ("metric", "statistic", "unit"))
-    return ErrorBar(row["of"], metric, statistic, unit, values, greatest, band)  # type: ignore[arg-type]
-
-
-def _numbers(values: object) -> list[float]:
-    if not isinstance(values, Iterable):
-        raise TypeError("no list of numbers")
-    return [math.nan if value is None else float(value) for value in values]

@@ -28,7 +28,7 @@ COSTS: dict[str, tuple[str, str]] = {
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
 # The type of an error, a bar or a cost.
-Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Amount = Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False)]
 # A slope needs at least this many points, whose errors span at least this factor.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 

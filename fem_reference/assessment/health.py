@@ -101,11 +101,6 @@ def from_reference(run: Followed) -> Found:
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
-def unrest(run: Followed) -> Found:
-    """Greatest displacement of a vertex since the last frame, in per cent of the body's size."""
-    return _off(run, np.concatenate([run.positions[:1], run.positions[:-1]]))
-
-
 def stretch(run: Followed) -> Found:
     """The greatest stretch of an edge of the surface, over that at rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -182,20 +177,9 @@ def _worst(run: Followed, each: Floats) -> Found:
     return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]
 
 
-_ALL = (
-    volume,
-    inside_out,
-    from_rest,
-    from_first,
-    from_reference,
-    unrest,
-    stretch,
-    penetration,
-    passed,
-    pierced,
-    overshoot,
-)
-QUANTITIES: dict[str, Callable[[Followed], Found]] = {quantity.__name__: quantity for quantity in _ALL}
+_SHAPE = (volume, inside_out, from_rest, from_first, from_reference, stretch)
+_CONTACT = (penetration, passed, pierced)
+QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one in (*_SHAPE, *_CONTACT, overshoot)}
 
 
 def unstable(run: Followed) -> str:

@@ -15,7 +15,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
-from fem_reference.report.gallery import Figure, Shot, ramp, ticks
+from fem_reference.report.gallery import Shot
 from fem_reference.report.pages import Page
 from fem_reference.report.words import number, title_of
 from fem_reference.runs.store import seconds_per_frame
@@ -26,7 +26,9 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case of that ``setup``."""
     current = versions.current
-    figures, missing = _pictures(versions, setup)
+    # Of the frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing.
+    run, found = current.candidate, versions.place
+    shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
     contents = {
         "versions": versions,
         "current": current,
@@ -36,14 +38,10 @@ def page(versions: Versions, setup: Setup) -> Page:
         "curves": [_curve(one, i) for i, one in enumerate(_shown(versions))],
         "moved": _moved(versions),
         "place": place(versions),
-        "figures": figures,
-        "missing": missing,
-        "ramp": ramp(),
-        "ticks": ticks,
+        "figures": shown[0],
+        "missing": shown[1],
         "sampled": versions.before is None,
         "seconds": seconds_per_frame(current.candidate),
-        "title_of": title_of,
-        "infinite": math.inf,
         "label": partial(label, current.scene, setup),
     }
     title = f"{current.candidate.name} against what it was: {current.scene.title}"
@@ -143,12 +141,6 @@ def _moved(versions: Versions) -> Drawing | None:
         axes.set_ylim(bottom=0)
 
     return over_frames("moved", "Distance of vertices from where they were", "mm", draw)
-
-
-def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:
-    """The frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing."""
-    run, found = versions.current.candidate, versions.place
-    return gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:

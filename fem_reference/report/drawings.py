@@ -77,9 +77,8 @@ def colour_of(i: int) -> str:
     if i == 0:
         return REFERENCE
     darker, k = divmod(i - 1, len(PALETTE))
-    red, green, blue = to_rgb(PALETTE[k])
-    share = (2 / 3) ** darker
-    return to_hex((share * red, share * green, share * blue))
+    red, green, blue = (share * (2 / 3) ** darker for share in to_rgb(PALETTE[k]))
+    return to_hex((red, green, blue))
 
 
 def look_of(i: int) -> dict[str, Any]:

@@ -90,8 +90,7 @@ def _figure() -> Drawing:
             line = make(_POINTS)(np.linspace(0, 1, 400))
             axes.plot(*line.T, linewidth=1.4, **look_of(i + 1), label=name)
         axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
-        axes.set_xlabel("x")
-        axes.set_ylabel("y")
+        axes.set(xlabel="x", ylabel="y")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-curves", "Curves through the same five points (Figure 3.1)", (4.6, 4.0), draw)
@@ -109,8 +108,7 @@ def _curves(found: Estimation) -> Drawing:
             axes.plot(counts, means, marker="o", markersize=3, **look_of(i + 1), label=name)
         logarithmic(axes)
         axes.set_xticks(counts)
-        axes.set_xlabel("known points of a fibre")
-        axes.set_ylabel("rms deviation of the others, mm")
+        axes.set(xlabel="known points of a fibre", ylabel="rms deviation of the others, mm")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-fibres", "Fibres: error against known points", (4.6, 4.0), draw)
@@ -134,9 +132,7 @@ def _blobs() -> Drawing:
         for i, apart in enumerate(_APART):
             axes.contour(*two_blobs(apart), levels=[0.0], colors=[colour_of(i + 1)])
             axes.plot([], [], color=colour_of(i + 1), label=f"{apart:g} radii apart")
-        axes.set_aspect("equal")
-        axes.set_xlabel("radii")
-        axes.set_ylabel("radii")
+        axes.set(aspect="equal", xlabel="radii", ylabel="radii")
         axes.legend(fontsize="x-small", loc="lower center", ncols=2)
 
     return drawn("estimation-blobs", "Two Gaussians, one surface or two (Figure 7.1)", (4.6, 4.0), draw)
@@ -147,14 +143,11 @@ def _fits(found: Estimation) -> Drawing:
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, case in enumerate(dict.fromkeys(one.case for one in found.fits)):
-            some = [one for one in found.fits if one.case == case]
-            axes.plot(
-                [one.gaussians for one in some], [one.rms for one in some], "o-", color=colour_of(i + 1), label=case
-            )
+            counts, errors = zip(*((one.gaussians, one.rms) for one in found.fits if one.case == case), strict=True)
+            axes.plot(counts, errors, "o-", color=colour_of(i + 1), label=case)
         logarithmic(axes)
         axes.set_xticks(sorted({one.gaussians for one in found.fits}))
-        axes.set_xlabel("Gaussians")
-        axes.set_ylabel("rms deviation of the surface, mm")
+        axes.set(xlabel="Gaussians", ylabel="rms deviation of the surface, mm")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-surfaces", "Muscles: error against Gaussians", (4.6, 4.0), draw)

@@ -38,7 +38,7 @@ def page(study: Study) -> Page:
         "main": MAIN,
         "costs": COSTS,
         "solvers": solvers,
-        "fronts": front_drawings,
+        "front": front,
         "sentences": sentences,
         "matched": matched,
         "left_out": left_out,
@@ -122,12 +122,8 @@ def left_out(case: CaseStudy) -> list[Point]:
     return [point for point in case.points if point.status != "converged"]
 
 
-def front_drawings(case: CaseStudy) -> list[Drawing]:
-    """Error against time, a drawing for each of the statistics shown."""
-    return [_front(case, error) for error in shown(case)]
-
-
-def _front(case: CaseStudy, error: str) -> Drawing:
+def front(case: CaseStudy, error: str) -> Drawing:
+    """Error against time, of one of the statistics shown."""
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
@@ -138,8 +134,7 @@ def _front(case: CaseStudy, error: str) -> Drawing:
         if (bar := case.bars.get(error, 0.0)) > 0:
             axes.set_ylim(bottom=min(axes.get_ylim()[0], bar / 2))
             axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
-        axes.set_xlabel("time of a frame, s")
-        axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
+        axes.set(xlabel="time of a frame, s", ylabel=f"{title_of(error)}, {case.units[error]}")
         if axes.get_legend_handles_labels()[0]:
             figure.legend(loc="outside lower center", ncols=3, fontsize="small")
 

@@ -8,7 +8,7 @@ from typing import Any
 from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.assessment.judge import Verdict
+from fem_reference.assessment.judge import Verdict, Word
 from fem_reference.io.texts import finite, plain
 from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
@@ -31,12 +31,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
     from_rest = {run.name: rows(run, (*comparison.changes[run.name], *exerted(run))) for run in comparison.runs}
-    facts = {
-        "case": comparison.scene.name,
-        "solver": reference.solver,
-        "status": reference.outcome.status,
-        "message": reference.outcome.message,
-        "verdict": comparison.word,
+    facts = _head(comparison.scene, reference, comparison.word) | {
         "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in comparison.runs},
@@ -51,17 +46,17 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
 def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
     """The result of a ``run`` without a comparison, with the keys of :func:`summary`."""
-    return {
-        "case": case.name,
-        "solver": run.solver,
-        "status": run.outcome.status,
-        "message": run.outcome.message,
-        "verdict": found.word,
+    return _head(case, run, found.word) | {
         "cost": {run.name: run.outcome.cost},
         "measures": rows(run, found.measures),
         "verdicts": [_verdict(verdict) for verdict in found.verdicts],
         "folder": str(run.folder),
     }
+
+
+def _head(case: Case, run: Run, word: Word) -> dict[str, Any]:
+    ended = {"status": run.outcome.status, "message": run.outcome.message}
+    return {"case": case.name, "solver": run.solver, **ended, "verdict": word}
 
 
 def as_csv(rows: Iterable[dict[str, Any]]) -> str:

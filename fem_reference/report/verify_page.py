@@ -142,8 +142,7 @@ def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None
 def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> None:
     axes.axvspan(1.0, limits[1], color=FAIL, alpha=0.05, linewidth=0)
     axes.axvline(1.0, color=FAIL, linewidth=1.4)
-    axes.set_xscale("log")
-    axes.set_xlim(*limits)
+    axes.set(xscale="log", xlim=limits)
     axes.xaxis.set_major_locator(LogLocator(numticks=12))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_yticks([])
@@ -185,8 +184,7 @@ def convergence(one: Result) -> Drawing:
         axes.xaxis.set_major_locator(FixedLocator(list(sizes)))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(lambda size, _: number(size))
-        axes.set_xlabel("mesh size [mm]")
-        axes.set_ylabel(f"error [{one.entry.unit}]")
+        axes.set(xlabel="mesh size [mm]", ylabel=f"error [{one.entry.unit}]")
         axes.legend(handlelength=2)
 
     return drawn(f"ladder-{one.entry.name}", one.entry.name, (3.7, 2.7), draw)

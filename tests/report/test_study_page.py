@@ -84,7 +84,7 @@ def test_each_drawing_has_the_front_of_its_own_statistic() -> None:
         curve.title: max(
             path.count("L") for path in re.findall(r'<path d="([^"]*)"[^>]*stroke-width: 1.2', curve.markup)
         )
-        for curve in study_page.front_drawings(case)
+        for curve in (study_page.front(case, error) for error in study_page.shown(case))
         if "stroke-width: 1.2" in curve.markup
     }
     assert lengths == {"Surface deviation, rms": 0, "Fibre length, rms percent": 1, "Volume, deviation": 0}
