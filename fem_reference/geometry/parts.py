@@ -66,7 +66,7 @@ def _rim_edges(parts: Parts) -> Ints:
     """The edges (e, 2) between triangles of different labels."""
     edges = Edges.of(parts.surface)
     left, right = parts.labels[edges.beside].T
-    return edges.ends[left != right]
+    return np.asarray(edges.ends[left != right])
 
 
 def _along_rims(parts: Parts) -> Floats:

@@ -45,6 +45,19 @@ def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
     )
 
 
+def thinned(points: NDArray[Any], triangles: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Points and triangles of about ``count`` triangles in place of more, by quadric errors (Garland and Heckbert 1997,
+    doi 10.1145/258734.258849): for pictures, not for computation. ``points`` (n, 3), ``triangles`` (m, 3) of any kind.
+    """
+    import pyvista
+
+    if len(triangles) <= count:
+        return points, triangles
+    fine = pyvista.PolyData.from_regular_faces(np.asarray(points, float), triangles)
+    few = fine.decimate(1 - (count - 1) / len(triangles))
+    return np.asarray(few.points, float), np.asarray(few.regular_faces)
+
+
 def _view(arrays: dict[str, NDArray[Any]], shot: int, bones: list[Any], direction: NDArray[Any]) -> Image.Image:
     points, outline = arrays[f"shot_{shot}_points"], arrays.get(f"shot_{shot}_outline")
     distances = arrays.get(f"shot_{shot}_distances")
