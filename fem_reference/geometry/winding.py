@@ -39,17 +39,12 @@ class Winding:
     @classmethod
     def straight(cls, count: int, starts: Floats, ends: Floats) -> "Winding":
         """The straight paths, with knots for ``count`` obstacles."""
-        knots = np.repeat(ends[:, None], 2 + count * (_STEPS + 1), axis=1)
-        knots[:, 0] = starts
         away = np.linalg.norm(ends - starts, axis=1)
-        tangents = np.repeat(
-            ((ends - starts) / np.where(away > 0, away, 1.0)[:, None])[:, None], knots.shape[1], axis=1
-        )
-        arcs = np.repeat(away[:, None], knots.shape[1], axis=1)
-        arcs[:, 0] = 0
-        return cls(
-            knots, tangents, arcs, np.zeros((len(starts), count), dtype=np.int64), np.zeros(len(starts), dtype=bool)
-        )
+        along = (ends - starts) / np.where(away > 0, away, 1.0)[:, None]
+        size = 2 + count * (_STEPS + 1)
+        knots, tangents, arcs = (np.repeat(one[:, None], size, axis=1) for one in (ends, along, away))
+        knots[:, 0], arcs[:, 0] = starts, 0.0
+        return cls(knots, tangents, arcs, np.zeros((len(starts), count), np.int64), np.zeros(len(starts), bool))
 
     def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
         """The paths ``which`` along geodesics ``same`` on the obstacles of a ``pattern``."""

@@ -52,7 +52,7 @@ class Paths:
         arms = (_across(touch - self.middles, self.axes) for touch in self.touches)
         along = (self.turns[:, None] * np.cross(self.axes, arm) + climb for arm in arms)
         first, last = (np.where(wraps[:, None], found, straight) for found in along)
-        return _units_or_zero(first), _units_or_zero(last)
+        return _units(first), _units(last)
 
     def at(self, which: Ints, shares: Floats) -> Floats:
         """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
@@ -130,10 +130,7 @@ def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
 
 
 def _units(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
-
-
-def _units_or_zero(vectors: Floats) -> Floats:
+    """Vectors (n, 3) of length 1 along ``vectors``, 0 for 0."""
     sizes = np.linalg.norm(vectors, axis=1)[:, None]
     return np.asarray(vectors / np.where(sizes > 0, sizes, 1.0))
 

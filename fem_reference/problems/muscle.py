@@ -52,10 +52,9 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
-from fem_reference.problems.joints import joints_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
-from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.

@@ -41,6 +41,19 @@ def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
     )
 
 
+def thinned(points: NDArray[Any], triangles: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Points and triangles of about ``count`` triangles in place of more, by quadric errors (Garland and Heckbert 1997,
+    doi 10.1145/258734.258849): for pictures, not for computation. ``points`` (n, 3), ``triangles`` (m, 3) of any kind.
+    """
+    import pyvista
+
+    if len(triangles) <= count:
+        return points, triangles
+    fine = pyvista.PolyData.from_regular_faces(np.asarray(points, float), triangles)
+    few = fine.decimate(1 - (count - 1) / len(triangles))
+    return np.asarray(few.points, float), np.asarray(few.regular_faces)
+
+
 def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction: NDArray[Any]) -> Image.Image:
     points, outline, distances = (shot[name] for name in ("points", "outline", "distances"))
     camera = _camera(points, points if outline is None else outline, direction)

@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
-from fem_reference.geometry.coarsening import thin
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
 from fem_reference.report.viewer_fields import Fields, arrows, at_numbers, joints
@@ -209,12 +208,12 @@ def _positions(frames: Floats, box: _Box) -> str:
 
 
 def _bone(bone: Bone, numbers: tuple[int, ...]) -> dict[str, Any]:
-    surface = thin(bone.surface, BONE_TRIANGLES)
-    box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
+    points, triangles = pictures.thinned(bone.surface.points, bone.surface.triangles, BONE_TRIANGLES)
+    box = _Box.around(points.min(axis=0), points.max(axis=0))
     return {
         "name": bone.name,
-        "triangles": _packed(surface.triangles.astype("<u4").tobytes()),
-        "positions": _positions(surface.points[None], box),
+        "triangles": _packed(triangles.astype("<u4").tobytes()),
+        "positions": _positions(points[None], box),
         "poses": [bone.pose(number).ravel().tolist() for number in numbers],
         **box.facts(),
     }

@@ -1,8 +1,6 @@
 """A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
 import logging
-import os
-import platform
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -20,7 +18,7 @@ from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import Watch
 from fem_reference.runs import store
-from fem_reference.runs.key import code_hash, key, versions
+from fem_reference.runs.key import code_hash, key, machine, versions
 from fem_reference.runs.store import Frame, Run, collected
 from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
@@ -225,5 +223,5 @@ class Bench[C: Case]:
             "fem_reference": __version__,
             "code": code_hash(solver),
             "versions": versions(),
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "machine": machine(),
         }
