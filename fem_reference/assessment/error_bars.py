@@ -163,7 +163,18 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]
-    return {"change": typical_changes(differences["change"], deviations, kinds), "deviation": deviations}
+    changes = typical_changes(differences["change"], deviations, kinds)
+    return {"change": _pooled(changes, kinds), "deviation": _pooled(deviations, kinds)}
+
+
+def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
+    """The ``sizes`` (f,) of differences by metric and statistic; of pooled ones at least their root mean square in the metric."""
+    pooled: dict[str, list[Floats]] = {}
+    for size, kind in zip(sizes, kinds, strict=True):
+        if described()[kind].pooled:
+            pooled.setdefault(kind[0], []).append(size)
+    least = {metric: np.sqrt(np.mean(np.square(some), axis=0)) for metric, some in pooled.items()}
+    return [np.maximum(size, least.get(metric, size)) for size, (metric, _) in zip(sizes, kinds, strict=True)]
 
 
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:

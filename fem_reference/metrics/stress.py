@@ -1,7 +1,7 @@
 """Stresses in the muscle's volume, of solvers that have them: means and quantiles over the volume at rest of the Cauchy stress.
 
-Along the fibres as they are, by von Mises, and the pressure, above 0 in compression. Quantiles are of the tetrahedra's middles: the
-greatest stress, at the rim of an attachment, grows without bound as tetrahedra get smaller. Of runs without stresses there is none.
+Along the fibres as they are, by von Mises, and the pressure, above 0 in compression, at four points of each tetrahedron: the
+greatest stress, at the rim of an attachment, grows without bound as these get smaller. Of runs without stresses there is none.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
@@ -14,20 +14,26 @@ STATISTICS = {
         curve="Stress along the fibres, mean over the volume",
         shown={"curve": 32},
         local=True,
+        pooled=True,
     ),
-    "along_fibres_p95": Statistic("kPa", _TITLE, "along fibres, 95 % below", local=True),
-    "von_mises_mean": Statistic("kPa", _TITLE, "von Mises, mean", local=True),
+    "along_fibres_p95": Statistic("kPa", _TITLE, "along fibres, 95 % below", local=True, pooled=True),
+    "von_mises_mean": Statistic("kPa", _TITLE, "von Mises, mean", local=True, pooled=True),
     "von_mises_p95": Statistic(
         *("kPa", _TITLE, "von Mises, 95 % below"),
         curve="Von Mises stress, which 95 % of the volume do not exceed",
         shown={"curve": 33},
         local=True,
+        pooled=True,
     ),
     "pressure_mean": Statistic(
-        *("kPa", _TITLE, "pressure, mean"), curve="Pressure, mean over the volume", shown={"curve": 34}, local=True
+        *("kPa", _TITLE, "pressure, mean"),
+        curve="Pressure, mean over the volume",
+        shown={"curve": 34},
+        local=True,
+        pooled=True,
     ),
-    "pressure_p05": Statistic("kPa", _TITLE, "pressure, 5 % below", local=True),
-    "pressure_p95": Statistic("kPa", _TITLE, "pressure, 95 % below", local=True),
+    "pressure_p05": Statistic("kPa", _TITLE, "pressure, 5 % below", local=True, pooled=True),
+    "pressure_p95": Statistic("kPa", _TITLE, "pressure, 95 % below", local=True, pooled=True),
 }
 OF, AGAINST = "surface", "reference"
 _KILO = 1000.0  # kPa in a MPa

@@ -42,7 +42,7 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
         some = slice(start, start + AT_ONCE)
-        jets = variables(F[some].reshape(-1, 9).T)
+        jets = variables(F[some].reshape(-1, 9).T, curved=False)
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JET_FUNCTIONS)
         with np.errstate(all="ignore"):  # what is no number is needed

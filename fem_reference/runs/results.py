@@ -205,7 +205,7 @@ class _Places:
         (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
         with np.errstate(all="ignore"):  # where det F is not positive
-            jets = variables(self.F.reshape(-1, 9).T)
+            jets = variables(self.F.reshape(-1, 9).T, curved=False)
             now = self._state([jets[0:3], jets[3:6], jets[6:9]], JET_FUNCTIONS)
             first = first_piola(acting, now, len(self.tets))
             stress = np.einsum("nik,njk->nij", first, self.F) / self.det_F[:, None, None]

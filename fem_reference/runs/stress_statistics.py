@@ -12,21 +12,24 @@ STATISTICS = {
     "pressure": ("mean", "p05", "p95"),
 }
 _MOST = 8192  # tetrahedra that are looked at, evenly spread
+# Barycentric coordinates of four points, of equal shares of the volume: exact to degree 2 (Hammer and Stroud 1956).
+_NEAR = (5 - 5**0.5) / 20
+_POINTS = np.full((4, 4), _NEAR) + (1 - 4 * _NEAR) * np.eye(4)
 
 
 def stress_scalars(results: Results, frame: float) -> dict[str, float]:
     """The mean and quantiles [MPa] over the volume at rest by name, such as ``stress_von_mises_p95``, which 95 % of the volume do
-    not exceed: of the Cauchy stress at the middle of each tetrahedron its part along the fibres, where they are known, the von
+    not exceed: of the Cauchy stress at four points of each tetrahedron its part along the fibres, where they are known, the von
     Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN where a tetrahedron is inside out.
     """
     mesh = results.mesh
     tets = np.unique(np.linspace(0, len(mesh.tets) - 1, _MOST).astype(int))
     own = {"along_fibres": "fibre_stress"} if results.fibre is not None else {}
     wanted = (*own.values(), "von_mises", "cauchy_stress")
-    found = results.evaluate_in(tets, np.full((len(tets), 4), 0.25), frame, wanted)
+    found = results.evaluate_in(np.repeat(tets, len(_POINTS)), np.tile(_POINTS, (len(tets), 1)), frame, wanted)
     values = {name: found[key] for name, key in own.items()} | {"von_mises": found["von_mises"]}
     values["pressure"] = -np.trace(found["cauchy_stress"], axis1=1, axis2=2) / 3
-    volumes = tet_volumes(mesh.points, mesh.tets[tets])
+    volumes = np.repeat(tet_volumes(mesh.points, mesh.tets[tets]), len(_POINTS))
     return {
         f"stress_{name}_{statistic}": _of(statistic, each, volumes)
         for name, each in values.items()
