@@ -1,7 +1,6 @@
 """Tables of the documentation: what is kept of each measurement, and the rows that a page shows of it."""
 
 import json
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -131,34 +130,14 @@ def _omission_rows() -> str:
 
 def _study(found: dict[str, Any]) -> Any:
     study = parse(cost_study.CaseStudy, found["cases"][0], "study")
-    solvers = []
-    for name in fronts.solvers(study.points):
-        price = fronts.price(study.counted, name, _SURFACE, _TIME)
-        default = next(one for one in study.counted if one.solver == name and one.is_default)
-        if price:
-            factor = price.factor if math.isfinite(price.factor) else None
-            front = {"best": price.best, "label": price.nearest.label, "time": price.nearest.costs[_TIME]}
-            given = {"error": default.errors[_SURFACE], "default_time": default.costs[_TIME]}
-            solvers.append({"solver": name} | given | front | {"factor": factor, "is_measured": price.is_measured})
     own = [one for one in study.points if one.name == "reference" and not one.is_truth and one.status == "converged"]
     keys = ("unknowns", _TIME)
     reference = [{"setting": one.label} | {key: one.costs[key] for key in keys} | _errors(one) for one in own]
-    return {"bar": study.bars[_SURFACE], "solvers": solvers, "reference": reference}
+    return {"bar": study.bars[_SURFACE], "reference": reference}
 
 
 def _errors(point: fronts.Point) -> dict[str, float]:
     return {name: point.errors[name] for name in (_SURFACE, "fibre_length.rms_percent")}
-
-
-def _study_solvers() -> str:
-    rows = []
-    for one in kept("study")["measured"]["solvers"]:
-        default = f"{number(one['error'], 2)} mm, {number(one['default_time'], 2)} s"
-        best = f"{number(one['best'], 2)} mm, {number(one['time'], 2)} s ({one['label']})"
-        verb = "" if one["is_measured"] else "would be "
-        half = f"{verb}{number(one['factor'], 2)} times" if (one["factor"] or 0) > 1 else "no setting reaches it"
-        rows.append((f"`{one['solver']}`", default, best, half))
-    return table("study", ("solver", "default", "best of its front", "time for half the error"), rows)
 
 
 def _study_reference() -> str:
@@ -213,7 +192,6 @@ TABLES = {
     "hip_flexion_worst": _comparison_worst,
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
-    "study_hip_flexion": _study_solvers,
     "study_reference": _study_reference,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
