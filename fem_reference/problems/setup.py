@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface
-from fem_reference.foundations.motion import RigidMotion, Rotation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
@@ -148,13 +148,15 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     InputError where a bone does not rotate about the axis of its joint: its angle would not be defined.
     """
     if not case.joint:
-        turning = ((bone, bone.motion) for bone in bones if isinstance(bone.motion, Rotation))
-        return tuple(_joint(bone.name, bone, motion, motion.axis, motion.centre) for bone, motion in turning)
+        moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)
+        return tuple(
+            _joint(bone.name, bone, one, one.axis, one.centre) for bone, one in moving if one.centre is not None
+        )
     by_name = {bone.name: bone for bone in bones}
     found = []
     for i, joint in enumerate(case.joint):
         bone, place = by_name[joint.bone], join(case.place, f"joint[{i}]")
-        if not isinstance(bone.motion, Rotation):
+        if bone.motion is None or bone.motion.centre is None:
             got = f'the bone "{bone.name}", which {"rests" if bone.motion is None else "slides"}'
             raise InputError(join(place, "bone"), got, "a bone that rotates, so that the joint has an angle")
         _check_axis(bone.motion, np.array(joint.axis), np.array(joint.centre), place)
@@ -162,17 +164,17 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def _joint(name: str, bone: Bone, motion: Rotation, axis: Vector, centre: Vector) -> Joint:
+def _joint(name: str, bone: Bone, motion: RigidMotion, axis: Vector, centre: Vector) -> Joint:
     """The joint of a bone; an ``axis`` against that of its ``motion`` counts the angle the other way."""
     unit, sign = _unit(axis), float(np.sign(np.dot(axis, motion.axis)))
     return Joint(name, bone, unit, np.array(centre), partial(_angle, motion, sign))
 
 
-def _angle(motion: Rotation, sign: float, frame: float) -> float:
-    return sign * float(np.interp(frame, motion.frames, motion.angles))
+def _angle(motion: RigidMotion, sign: float, frame: float) -> float:
+    return sign * float(np.interp(frame, motion.frames, motion.amounts))
 
 
-def _check_axis(motion: Rotation, axis: Floats, centre: Floats, place: str) -> None:
+def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -> None:
     turns, away = _unit(motion.axis), centre - np.array(motion.centre)
     if np.linalg.norm(np.cross(_unit(axis), turns)) > _SAME_DIRECTION:
         want = f"that of the bone's motion, {motion.axis}, or its opposite"

@@ -18,7 +18,7 @@ from fem_reference.report.curves import curves, label_of
 from fem_reference.report.drawings import look_of
 from fem_reference.report.pages import Headlines, Page
 from fem_reference.report.sections import cost, origin
-from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, summary
+from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, spread, summary
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number
 from fem_reference.runs.store import Run, seconds_per_frame
@@ -63,6 +63,7 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
         "curves": curves,
         "bars": known(comparison),
+        "spread": spread(comparison),
         "error": error and error.worst,
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,

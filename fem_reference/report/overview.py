@@ -12,7 +12,7 @@ from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described, find
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.report.sections.error_bars import spread
+from fem_reference.report.tables import spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 

@@ -19,6 +19,12 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
+# The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
+SPREAD = (
+    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them "
+    "(5.3 and 8.8 % on two muscles of the hip): the error bars of forces and moments leave that out"
+)
+
 
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
@@ -71,6 +77,12 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
     """The error bars of the reference, if there are any."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
+
+
+def spread(comparison: Comparison) -> str:
+    """The sentence on what error bars of forces leave out; empty where none are known or no attachment is by springs."""
+    forces = any(bar.metric == "joint_moment" for bar in known(comparison))
+    return SPREAD if forces and any(one.stiffness is not None for one in comparison.setup.attached) else ""
 
 
 def inversion(run: Run) -> tuple[Measure, ...]:
