@@ -62,7 +62,7 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
         ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
         for i, case in enumerate(dict.fromkeys(one.case for one in claims)):
             some = [one for one in shown if one.case == case]
-            look = {"color": colour_of(i + 1), "label": case, "alpha": 0.7}
+            look: dict[str, Any] = {"color": colour_of(i + 1), "label": case, "alpha": 0.7}
             axes.plot([one.error for one in some], [one.bar for one in some], ".", **look)
         axes.plot(ends, ends, color="#555555", linewidth=1)
         axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")
