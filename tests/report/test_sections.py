@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
 from fem_reference.report.sections import FOLDER, sections
+from fem_reference.report.sections.error_bars import widest
 from fem_reference.report.sections.reference import least
 from tests.report.comparisons import NAN, alone, html, with_bars
 
@@ -73,3 +75,15 @@ def test_a_template_that_is_no_section_is_named(head, want, tmp_path):
 
 def test_least_of_nothing_known_is_not_a_number():
     assert np.isnan(least(Measure("inversion", "min_det_F", "1", np.array([NAN, NAN]))))
+
+
+def test_a_bar_is_widest_where_its_statistic_has_a_value_and_an_unknown_one_there_is_the_widest() -> None:
+    def at(bars: list[float], values: list[float]) -> int:
+        bar = ErrorBar("change", "joint_moment", "arm", "mm", np.array(bars), {})
+        return widest(bar, Measure("joint_moment", "arm", "mm", np.array(values)))
+
+    nan = float("nan")
+    assert at([nan, 1.0, 2.0], [nan, 5.0, 5.0]) == 2
+    assert at([nan, 0.0, 0.0], [nan, 5.0, 5.0]) == 1
+    assert at([nan, nan, 2.0], [nan, 5.0, 5.0]) == 1
+    assert at([nan, nan, 2.0], [nan, nan, nan]) == 0
