@@ -151,7 +151,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
             if one.metric == "volume" and one.statistic in outside:
                 parts[CARRIED] = SAFETY * outside[one.statistic]
-            greatest = {name: float(part.max()) for name, part in parts.items()}
+            there = np.isfinite(one.values)  # an arm has none without a force
+            greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))

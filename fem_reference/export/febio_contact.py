@@ -6,7 +6,7 @@ rigid copy of the area attached, which keeps its rest area. So it is the springs
 the same in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -37,7 +37,7 @@ _FELT = 1e-3  # [mm]: an overlap at rest that is worth a word
 
 def has_contact(problem: MuscleProblem) -> bool:
     """True where the file has a section ``Contact``, whose tangent is not symmetric."""
-    return bool(febio_mesh.obstacles(problem) or febio_mesh.by_springs(problem))
+    return bool(problem.obstacles or febio_mesh.by_springs(problem))
 
 
 def add_contact(root: Element, problem: MuscleProblem) -> None:
@@ -49,14 +49,14 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
         settings = {"penalty": penalty(problem, attached), "search_radius": SPRING_SEARCH_RADIUS}
         _pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
     deep = overlaps(problem)
-    for bone in febio_mesh.obstacles(problem):
+    for bone in problem.obstacles:
         assert problem.contact is not None  # or there is no contact
         radius = search_radius(problem, deep[bone.name])
         settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": 0.0}
         _pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
 
 
-def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | None]) -> None:
+def _pair(contacts: Element, kind: str, name: str, settings: Mapping[str, float | None]) -> None:
     """A contact of a ``kind`` between the surfaces of the pair of this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})
@@ -70,15 +70,12 @@ def penalty(problem: MuscleProblem, attached: AttachedVertices) -> float:
 
 def overlaps(problem: MuscleProblem) -> dict[str, float]:
     """Depths [mm] by bone in contact of the facets of the contact surface inside it at rest: at corners and middles; 0 outside."""
-    if not febio_mesh.obstacles(problem):
+    if not problem.obstacles:
         return {}
     corners = problem.mesh.points[febio_mesh.free_facets(problem)]
     middles = corners[:, febio_mesh.EDGES[:3]].mean(axis=2)
     points = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
-    inside = (
-        (bone.name, -signed_distances(points, febio_mesh.outward(bone.surface)))
-        for bone in febio_mesh.obstacles(problem)
-    )
+    inside = ((bone.name, -signed_distances(points, febio_mesh.outward(bone.surface))) for bone in problem.obstacles)
     return {name: float(depths.max(initial=0.0)) for name, depths in inside}
 
 

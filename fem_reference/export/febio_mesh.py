@@ -72,12 +72,6 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def obstacles(problem: MuscleProblem) -> list[Bone]:
-    """The bones in contact with the muscle."""
-    contact = problem.contact
-    return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
-
-
 def outward(surface: Surface) -> Surface:
     """The surface with its normals pointing out of it."""
     turned = enclosed_volume(surface.points, surface.triangles) < 0
@@ -158,7 +152,7 @@ class Mesh:
             rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), number)
             number += len(cells[name])
         self._attached(mesh)
-        if obstacles(self.problem):
+        if self.problem.obstacles:
             self._contact_surface(mesh, cells)
         for attached in by_springs(self.problem):
             self._tied(mesh, attached, cells[springs_id(attached)])
@@ -196,7 +190,7 @@ class Mesh:
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
         """The contact surface, and its pairs with the bones."""
         self._surface(mesh, "muscle_free", "tri6", self._curved(free_facets(self.problem)))
-        names = [bone_id(bone) for bone in obstacles(self.problem)]
+        names = [bone_id(bone) for bone in self.problem.obstacles]
         for name in names:
             self._surface(mesh, f"{name}_surface", "tri3", cells[name])
         for name in names:

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
+from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import described, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
@@ -74,12 +76,22 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "seconds_per_frame": seconds_per_frame,
         "inversion": inversion,
         "greatest": greatest,
+        "widest": widest,
         "gap": gap,
         "energy_gap_limit": ENERGY_GAP,
         "second_check": second_check.texts_of,
         **cost.facts(comparison),
         **origin.facts(comparison),
     }
+
+
+def widest(bar: ErrorBar, measure: Measure | None) -> int:
+    """The index of the widest of a ``bar`` among the frames in which the reference's ``measure`` has a value, such as a moment arm
+    where there is a force; an unknown bar there counts as the greatest.
+    """
+    if measure is None or not np.isfinite(measure.values).any():
+        return bar.widest
+    return replace(bar, values=np.where(np.isfinite(measure.values), bar.values, -1.0)).widest
 
 
 def greatest(values: Floats) -> float:

@@ -313,5 +313,6 @@ def test_forces_and_moments_have_bars_in_their_own_units() -> None:
         arm = found.find(of, "joint_moment", "arm")
         assert arm is not None
         assert arm.values == pytest.approx([np.nan, 0, 0], abs=1e-12, nan_ok=True)
+        assert arm.parts == {"tetrahedra": pytest.approx(0, abs=1e-12)}  # of the frames that have an arm
     assert found.find("change", "moment_arm", "mean") is not None
     assert bars().find("change", "joint_moment", "force") is None

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBar
+from fem_reference.metrics import Measure
 from fem_reference.report import comparison_page
 from tests.report.comparisons import NAN, alone, html, with_bars
 
@@ -69,3 +71,15 @@ def test_of_a_reference_without_a_frame_what_was_spent_and_its_provenance_remain
 def test_what_is_nowhere_known_is_not_a_number_on_the_page():
     assert np.isnan(comparison_page.greatest(np.array([NAN, NAN])))
     assert -comparison_page.greatest(-np.array([NAN, 0.5, 0.25])) == 0.25
+
+
+def test_a_bar_is_widest_where_its_statistic_has_a_value_and_an_unknown_one_there_is_the_widest() -> None:
+    def at(bars: list[float], values: list[float]) -> int:
+        bar = ErrorBar("change", "joint_moment", "arm", "mm", np.array(bars), {})
+        return comparison_page.widest(bar, Measure("joint_moment", "arm", "mm", np.array(values)))
+
+    nan = float("nan")
+    assert at([nan, 1.0, 2.0], [nan, 5.0, 5.0]) == 2
+    assert at([nan, 0.0, 0.0], [nan, 5.0, 5.0]) == 1
+    assert at([nan, nan, 2.0], [nan, 5.0, 5.0]) == 1
+    assert at([nan, nan, 2.0], [nan, nan, nan]) == 0
