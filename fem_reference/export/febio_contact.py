@@ -56,7 +56,7 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
         _pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
 
 
-def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | None]) -> None:
+def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
     """A contact of a ``kind`` between the surfaces of the pair of this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})
