@@ -6,7 +6,7 @@ rigid copy of the area attached, which keeps its rest area. So it is the springs
 the same in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -56,7 +56,7 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
         _pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
 
 
-def _pair(contacts: Element, kind: str, name: str, settings: Mapping[str, float | None]) -> None:
+def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
     """A contact of a ``kind`` between the surfaces of the pair of this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})
