@@ -12,7 +12,7 @@ from odd import INF, NAN, often, rarely
 
 import fem_reference as fr
 from fem_reference.foundations.mesh import Floats, Polylines, Surface
-from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.metrics import MeasurementContext, joint_moment, moment_arm
 from fem_reference.problems.setup import Bone, Joint
 from fem_reference.runs.store import Outcome, Run
@@ -87,7 +87,7 @@ def asked(pulled: Run, bone: Any, centre: Any) -> None:
 
 def measured(one: Run, other: Run, angles: tuple[float, ...]) -> None:
     """Moments and arms; what depends on a number that is none is none."""
-    motion = Rotation((0, 0, 1), tuple(CENTRE.tolist()), (0.0, 1.0, 2.0, 3.0), angles)
+    motion = RigidMotion((0, 0, 1), tuple(CENTRE.tolist()), (0.0, 1.0, 2.0, 3.0), angles)
     bone = Bone("femur", BALL, motion)
     joint = Joint(
         "hip", bone, np.array([0.0, 0, 1]), CENTRE, lambda frame: float(np.interp(frame, motion.frames, angles))

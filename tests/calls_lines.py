@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from odd import odd, rarely
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface
-from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems.muscle import MuscleProblem
@@ -20,16 +20,16 @@ from fem_reference.problems.setup import Joint
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action, rbf_muscle, viper
 
-SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
+SWING = RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 MOTIONS = [
     SWING,
     None,
-    Rotation((0, 0, 1), (5, 5, 0), (0.0, 10.0), (0.0, 1.0)),
-    Translation((0, 0, 1), (0.0, 10.0), (0.0, 9.0)),
+    RigidMotion((0, 0, 1), (5, 5, 0), (0.0, 10.0), (0.0, 1.0)),
+    RigidMotion((0, 0, 1), None, (0.0, 10.0), (0.0, 9.0)),
 ]
 MOTIONS += [
-    Rotation((1, 0, 0), (5, 25, 15), (0.0, 5.0, 10.0), (0.0, 1.2, 0.0)),
-    Rotation((1, 0, 0), (5, 5, 15), (0.0, 10.0), (0.0, 3.0)),
+    RigidMotion((1, 0, 0), (5, 25, 15), (0.0, 5.0, 10.0), (0.0, 1.2, 0.0)),
+    RigidMotion((1, 0, 0), (5, 5, 15), (0.0, 10.0), (0.0, 3.0)),
 ]
 
 

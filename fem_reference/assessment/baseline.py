@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 FORMAT = 1
 # Decimal places that a statistic is stored with, by its unit, and a coordinate [mm].
-PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2}
+PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
 # The greatest distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
