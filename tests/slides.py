@@ -1,7 +1,9 @@
 """A rigid body that slides, for tests of contact."""
 
+import sys
 from dataclasses import dataclass
 
+import cloudpickle
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -25,3 +27,6 @@ class Slide:
         pose[:3, :3] = Rotation.from_rotvec(self.turned).as_matrix()
         pose[:3, 3] = np.array(self.start) + np.array(self.path) * frame
         return pose
+
+
+cloudpickle.register_pickle_by_value(sys.modules[__name__])  # to the process that solves, which cannot import it
