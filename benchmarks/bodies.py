@@ -84,7 +84,7 @@ def spindle(rings: int, slices: int) -> MuscleProblem:
     ends = (np.flatnonzero(np.isclose(surface.points[:, 2], end)) for end in (-half, half))
     attached = tuple(AttachedVertices(*each) for each in zip(facets, bones, ends, strict=True))
     axis = Polylines(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), np.array([0, 2]))
-    return MuscleProblem(surface, bones, attached, (0, 1), None, mesh, (), axis, {}, 0.0)
+    return MuscleProblem(surface, bones, attached, (0, 1), None, mesh, (), axis)
 
 
 def _bones(half: float, beside: Floats) -> tuple[Bone, Bone]:

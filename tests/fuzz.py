@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import calls
+import damage
 import hostile
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
@@ -99,7 +100,7 @@ def fuzz(name: str, inputs: int, number: int, kept: Path) -> Tried:
             tried.failed.append(f"{name}: undamaged: {said}")
             return tried
         targets = sorted(path.relative_to(whole) for path in whole.glob(kind.damaged) if path.is_file())
-        strategies = {target: hostile.damage((whole / target).read_bytes()) for target in targets}
+        strategies = {target: damage.damage((whole / target).read_bytes()) for target in targets}
 
         @seed(number)
         @settings(UNTIMED, max_examples=inputs)

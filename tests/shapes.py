@@ -102,6 +102,4 @@ def bar(
         mesh=mesh,
         effects=effects,
         fibres=Polylines(middle, np.array([0, 5])),
-        mesh_facts={},
-        seconds=0.0,
     )

@@ -5,12 +5,13 @@ import logging
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from fem_reference import metrics
+from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
@@ -24,7 +25,7 @@ log = logging.getLogger(__name__)
 
 FORMAT = 1
 # Decimal places that a statistic is stored with, by its unit, and a coordinate [mm].
-PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2}
+PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
 # The greatest distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
@@ -183,43 +184,31 @@ def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: st
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
     """A statistic with its limits from ``before``, else with those that its error bars give."""
-    limits = Limits.of(one, bars)
+    tolerance, within = limits(one, bars)
     if before is not None:
-        limits = Limits(before.tolerance, limits.within if before.within is None else before.within)
+        tolerance, within = before.tolerance, within if before.within is None else before.within
     values = tuple(
         round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
     )
-    return StoredStatistic(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
+    return StoredStatistic(tolerance=tolerance, unit=one.unit, values=values, within=within)
 
 
-class Limits(NamedTuple):
-    """The ``tolerance`` of a change of a statistic, and its distance ``within`` from the reference, None if not known."""
+def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
+    """The tolerance of a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
+    from the error bars (f,) of a deviation.
 
-    tolerance: float
-    within: float | None
-
-    @classmethod
-    def of(cls, one: Measure, bars: Floats) -> "Limits":
-        """The limits of a new baseline, from the error bars (f,) of a deviation.
-
-        ``tolerance``: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest
-        value: the past is exact even where the reference is uncertain. ``within``: the greatest sum of a value and its bar; for a
-        measure of the run itself, which has no bar, the greatest value plus its tolerance.
-        """
-        least = 10.0 * 10.0 ** -PLACES[one.unit]
-        values, bar, itself = np.abs(one.values), _greatest(bars), metrics.of_itself(one.metric)
-        share = SHARE * _greatest(values)
-        tolerance = _up(np.nanmax([least, share if itself else np.fmin(share, bar)]))
-        if math.isnan(bar) or math.isnan(share):
-            return cls(tolerance, None)
-        known = _greatest(values + (tolerance if itself else bars))
-        return cls(tolerance, _up(max(least, _ROUNDING * known)))
-
-
-def _greatest(values: Floats) -> float:
-    """The greatest of the finite ``values`` (f,), NaN without one."""
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if len(finite) else math.nan
+    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value: the past
+    is exact even where the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of the run
+    itself, which has no bar, the greatest value plus its tolerance.
+    """
+    least = 10.0 * 10.0 ** -PLACES[one.unit]
+    values, bar, itself = np.abs(one.values), greatest(bars), metrics.of_itself(one.metric)
+    share = SHARE * greatest(values)
+    tolerance = _up(np.nanmax([least, share if itself else np.fmin(share, bar)]))
+    if math.isnan(bar) or math.isnan(share):
+        return tolerance, None
+    known = greatest(values + (tolerance if itself else bars))
+    return tolerance, _up(max(least, _ROUNDING * known))
 
 
 def _up(value: float) -> float:

@@ -107,7 +107,7 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict of the case; none rests on a denied reference."""
+        """The verdict of the case; a denied reference is never the basis of one."""
         if self.reference.outcome.status == "denied":
             return "fail"
         return doubted(overall(one.word for one in self.verdicts), self.doubts)

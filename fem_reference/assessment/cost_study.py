@@ -43,7 +43,7 @@ class CaseStudy:
 
     @property
     def counted(self) -> tuple[Point, ...]:
-        """The points with their errors bounded below by the truth's bar, as nothing is known below it."""
+        """The points with their errors bounded below by the truth's bar, as smaller errors cannot be distinguished."""
         return self._with_errors(max)
 
     @property
@@ -85,13 +85,8 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
     return {"format": FORMAT, **asdict(case), "origin": origin}
 
 
-def load(path: Path) -> CaseStudy:
-    """The study of a case from a file written by :func:`facts`; InputError with the key where it is invalid."""
-    return _read(texts.read_json(path, _WANT), f"{path}")
-
-
-def load_all(path: Path) -> list[CaseStudy]:
-    """The study of a case, or those of several, from a file; InputError as in :func:`load`."""
+def load(path: Path) -> list[CaseStudy]:
+    """The study of a case, or those of several, from a file written by :func:`facts`; InputError with the key that is invalid."""
     found = texts.read_json(path, _WANT)
     if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
@@ -111,20 +106,15 @@ def _read(table: Any, place: str) -> CaseStudy:
 def _check(study: CaseStudy, place: str) -> None:
     """Raise InputError below ``place`` where a study lacks a feature, has an unknown unit, or unusable points."""
     _check_features(study, place)
-    for name, bar in study.bars.items():
-        if not bar <= _MOST:
-            raise InputError(f"{place}: bars.{name}", f"{bar:g}", f"at most {_MOST:g}")
     known = metrics.units()
     for name, unit in study.units.items():
         if unit != known.get(name, unit) or unit not in known.values():
             want = known.get(name) or f"one of {', '.join({*known.values()})}"
             raise InputError(f"{place}: units.{name}", f'"{unit}"', want)
     for i, point in enumerate(study.points):
-        for name, error in point.errors.items():
+        for name in point.errors:
             if name not in study.units:
                 raise InputError(f"{place}: points[{i}].errors.{name}", "an error without a unit", f"units.{name}")
-            if not error <= _MOST:
-                raise InputError(f"{place}: points[{i}].errors.{name}", f"{error:g}", f"at most {_MOST:g}")
         _check_scene(point.choice.get("scene", {}), f"{place}: points[{i}].choice.scene")
 
 

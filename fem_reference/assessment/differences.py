@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; a difference in one frame or statistic that is small by chance counts as on average."""
+"""Sizes of differences between two runs; where one frame or statistic is small by chance, the average counts."""
 
 import math
 from collections.abc import Iterable
@@ -11,6 +11,12 @@ from fem_reference.runs.store import Run
 # Prefixes of statistics that are the value at one place; the average over places goes with each.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
 _MOVED = 0.01  # of a surface's greatest motion: below it, shares of the motion have no meaning
+
+
+def greatest(values: Floats) -> float:
+    """The greatest of the finite ``values`` (f,), NaN without one."""
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if len(finite) else math.nan
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
@@ -50,7 +56,7 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     By the triangle inequality, changes of the same places differ by at most their deviation, and by less as most of it is not
     along the displacement or cancels. One statistic alone does not show how much less: its difference may be small by chance,
     most of all that of the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing cancels
-    there, and no quantile of the deviation bounds it. So it is known no better than any one place, in the root mean square.
+    there, and no quantile of the deviation bounds it. So its difference counts as at least the root mean square distance of places.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]

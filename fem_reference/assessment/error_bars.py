@@ -7,19 +7,19 @@ rest is the share of these deviations by which the changes of its runs differ.
 
 import json
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
+from pydantic import BeforeValidator, PlainValidator, TypeAdapter
 
 from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
 from fem_reference.runs.store import Run
 
@@ -39,13 +39,18 @@ VARIATION = 2.0
 # other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
+# Numbers in a file, which has None for one that is not finite.
+_Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+_Numbers = Annotated[
+    Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
+]
 # By sort of bar, the differences (f,) of each statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The error bar of one statistic: its distance from the truth by the reference's own error, ``values`` (f,) in ``unit``, NaN
+    """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN
     where unknown. It is ``of`` the reference's own change from rest or of a candidate's deviation from the reference. ``parts``: by
     cause, its greatest contribution over the frames.
 
@@ -57,9 +62,9 @@ class ErrorBar:
     metric: str
     statistic: str
     unit: str
-    values: Floats
-    parts: dict[str, float]
-    model: Floats | None = None
+    values: _Numbers
+    parts: dict[str, _Number]
+    model: _Numbers | None = None
 
     @property
     def widest(self) -> int:
@@ -93,8 +98,8 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, ``varied``
-    are by name as ``coarse`` with one cause of error halved, and ``exact`` has exact attachments in place of springs.
+    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
+    ``varied`` is ``coarse`` with one cause of error halved, by name, and ``exact`` has exact attachments in place of springs.
 
     ``sizes`` [mm]: those of the tetrahedra; ``safety``: the factor of bars over the expected error.
     """
@@ -146,7 +151,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
             if one.metric == "volume" and one.statistic in outside:
                 parts[CARRIED] = SAFETY * outside[one.statistic]
-            greatest = {name: float(part.max()) for name, part in parts.items()}
+            there = np.isfinite(one.values)  # an arm has none without a force
+            greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
@@ -158,7 +164,18 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]
-    return {"change": typical_changes(differences["change"], deviations, kinds), "deviation": deviations}
+    changes = typical_changes(differences["change"], deviations, kinds)
+    return {"change": _pooled(changes, kinds), "deviation": _pooled(deviations, kinds)}
+
+
+def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
+    """The ``sizes`` (f,) of differences by metric and statistic; of pooled ones at least their root mean square in the metric."""
+    pooled: dict[str, list[Floats]] = {}
+    for size, kind in zip(sizes, kinds, strict=True):
+        if described()[kind].pooled:
+            pooled.setdefault(kind[0], []).append(size)
+    least = {metric: np.sqrt(np.mean(np.square(some), axis=0)) for metric, some in pooled.items()}
+    return [np.maximum(size, least.get(metric, size)) for size, (metric, _) in zip(sizes, kinds, strict=True)]
 
 
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
@@ -178,16 +195,8 @@ def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Fl
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
     """Store the error ``bars`` in the ``folder`` of their run; :func:`load` reads them only for the same ``of``."""
-    rows = [
-        vars(bar)
-        | {"values": [finite(value) for value in bar.values]}
-        | {"parts": {name: finite(part) for name, part in bar.parts.items()}}
-        | {"model": None if bar.model is None else [finite(value) for value in bar.model]}
-        for bar in bars.bars
-    ]
     table = {"format": FORMAT, "of": of, "numbers": bars.numbers, "sizes_mm": bars.sizes, "order": bars.order}
-    table["bars"] = rows
-    files.write_text(folder / FILE, json.dumps(table, indent=1, allow_nan=False))
+    files.write_text(folder / FILE, json.dumps(plain(table | {"bars": bars.bars}), indent=1, allow_nan=False))
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
@@ -199,28 +208,10 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
         table = texts.read_json(place, "the error bar of a stored run (--error-bar makes it anew)")
         if table["format"] != FORMAT or table["of"] != of:
             return None
-        numbers = tuple(int(number) for number in table["numbers"])
-        bars = tuple(_bar(row, len(numbers)) for row in table["bars"])
-        fine, coarse = (float(size) for size in table["sizes_mm"])
-        return ErrorBars(numbers, (fine, coarse), float(table["order"]), bars)
+        bars = TypeAdapter(ErrorBars).validate_python(table | {"sizes": table["sizes_mm"]})
+        for bar in bars.bars:
+            if any(one is not None and one.shape != (len(bars.numbers),) for one in (bar.values, bar.model)):
+                raise ValueError(f"the bar of {bar.metric}.{bar.statistic}")
+        return bars
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
-
-
-def _bar(row: dict[str, object], frames: int) -> ErrorBar:
-    values = np.array(_numbers(row["values"]))
-    parts, model = row["parts"], row["model"]
-    band = None if model is None else np.array(_numbers(model))
-    if any(one is not None and one.shape != (frames,) for one in (values, band)) or row["of"] not in get_args(Of):
-        raise ValueError(f"the bar of {row['metric']}.{row['statistic']}")
-    if not isinstance(parts, dict):
-        raise TypeError("no parts by name")
-    greatest = dict(zip(parts, _numbers(list(parts.values())), strict=True))
-    metric, statistic, unit = (str(row[key]) for key in ("metric", "statistic", "unit"))
-    return ErrorBar(row["of"], metric, statistic, unit, values, greatest, band)  # type: ignore[arg-type]
-
-
-def _numbers(values: object) -> list[float]:
-    if not isinstance(values, Iterable):
-        raise TypeError("no list of numbers")
-    return [math.nan if value is None else float(value) for value in values]

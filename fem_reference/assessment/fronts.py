@@ -5,7 +5,7 @@ Wanner 1993, Solving Ordinary Differential Equations I, II.10).
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -28,7 +28,7 @@ COSTS: dict[str, tuple[str, str]] = {
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
 # The type of an error, a bar or a cost.
-Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Amount = Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False)]
 # A slope needs at least this many points, whose errors span at least this factor.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
@@ -134,29 +134,21 @@ class Match:
     best: dict[str, Point]
 
 
-def at_same_cost(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
-    """The point of the least ``error`` of each solver among those that cost at most ``at``, the cheapest where several have it."""
-    known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[1] <= at]
-    return Match(cost, at, _least(known))
-
-
-def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
-    """The point that costs the least of each solver among those whose ``error`` is at most ``at``."""
-    known = [(pair[::-1], point) for point in points if (pair := point.at(error, cost)) and pair[0] <= at]
-    return Match(error, at, _least(known))
-
-
-def _least(known: Sequence[tuple[tuple[float, float], Point]]) -> dict[str, Point]:
-    """The point with the least pair of numbers of each solver, the least of all first."""
+def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
+    """The best point of each solver among those whose ``same``, the name of the error or of the cost, is at most ``at``; of equals
+    the one with less of it.
+    """
+    i = 0 if same == error else 1
+    known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()
-    for _, point in sorted(known, key=lambda one: one[0]):
+    for _, point in sorted(known, key=lambda one: (one[0][1 - i], one[0][i])):
         best.setdefault(point.solver, point)
-    return best
+    return Match(same, at, best)
 
 
-def levels(points: Iterable[Point], error: str, cost: str, *, of_error: bool, count: int = 5) -> tuple[float, ...]:
+def levels(points: Iterable[Point], error: str, cost: str, *, same: str, count: int = 5) -> tuple[float, ...]:
     """Errors or costs over the range of the points at which they can be compared: 1, 2 or 5 times a power of ten."""
-    values = [pair[0 if of_error else 1] for point in points if (pair := point.at(error, cost))]
+    values = [pair[0 if same == error else 1] for point in points if (pair := point.at(error, cost))]
     if not values:
         return ()
     powers = range(math.floor(math.log10(min(values))), math.ceil(math.log10(max(values))) + 1)

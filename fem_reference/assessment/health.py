@@ -17,7 +17,7 @@ from fem_reference.problems.setup import Bone
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A run as its health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
+    """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
     ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, with which vertices
     that are ``free`` (n,) may be in contact; ``truth`` (f, n, 3), the vertices of the reference, where they are the same;
     ``integrated`` (f,), V/V0 from the solver itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the
@@ -101,11 +101,6 @@ def from_reference(run: Followed) -> Found:
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
-def unrest(run: Followed) -> Found:
-    """Greatest displacement of a vertex since the last frame, in per cent of the body's size."""
-    return _off(run, np.concatenate([run.positions[:1], run.positions[:-1]]))
-
-
 def stretch(run: Followed) -> Found:
     """The greatest stretch of an edge of the surface, over that at rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -182,20 +177,9 @@ def _worst(run: Followed, each: Floats) -> Found:
     return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]
 
 
-_ALL = (
-    volume,
-    inside_out,
-    from_rest,
-    from_first,
-    from_reference,
-    unrest,
-    stretch,
-    penetration,
-    passed,
-    pierced,
-    overshoot,
-)
-QUANTITIES: dict[str, Callable[[Followed], Found]] = {quantity.__name__: quantity for quantity in _ALL}
+_SHAPE = (volume, inside_out, from_rest, from_first, from_reference, stretch)
+_CONTACT = (penetration, passed, pierced)
+QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one in (*_SHAPE, *_CONTACT, overshoot)}
 
 
 def unstable(run: Followed) -> str:

@@ -27,6 +27,7 @@ _KINDS = {
     "N": ("a force", 1.0),
     "N mm": ("a moment", 1.0),
     "MPa": ("a pressure", 1.0),
+    "kPa": ("a pressure", 1000.0),
     "1": ("a number", 1.0),
 }
 _LOW = 0.1  # det F, below which a state is hardly valid

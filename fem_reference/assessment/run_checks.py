@@ -21,8 +21,10 @@ from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
+from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
+from fem_reference.runs.contents import scalar_vectors
 from fem_reference.runs.store import Run
 
 # A position is correct up to this share of the body's size; rounding of stored values is a thousandth of it.
@@ -193,25 +195,31 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external effects. With
-    weights and dead loads these are what bones carry; other external forces depend on the deformation.
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else what
+    the bones carry of these. An effect of a user's own may be such a load, so that nothing is known with one.
     """
-    # The origin of force of a user's own effect is unknown.
-    foreign = [one for one in problem.effects if not type(one).__module__.startswith("fem_reference.effects.")]
-    outer = foreign or any(one.outer for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
-    for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
-        if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
-            for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
-                yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
-    carried = [run.force(bone.name) for bone in problem.bones if f"force_on_{bone.name}_x" in run.scalars]
-    for i, number in enumerate(run.numbers if outer and not foreign and carried and math.isfinite(allowed) else ()):
-        if (load := problem.load(number)) is not None:
-            off, rounding = (
-                float(np.linalg.norm(one)) for one in (np.sum(carried, axis=0)[i] - load, _ROUNDING * load)
-            )
-            yield RunCheck("forces that bones do not carry", off, allowed + rounding, "N", number)
+    own = all(type(one).__module__.startswith("fem_reference.effects.") for one in problem.effects)
+    outer = any(one.outer for one in problem.effects)
+    kinds = (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max())))
+    for kind, unit, arm in kinds if own and math.isfinite(allowed) else ():
+        for i, value in enumerate(() if outer else run.scalars.get(f"net_{kind}", ())):
+            yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, run.numbers[i])
+        bones = [bone.name for bone in problem.bones if f"{kind}_on_{bone.name}_x" in run.scalars]
+        carried = np.sum([getattr(run, kind)(bone) for bone in bones], axis=0)
+        for i, load in _loads(problem, run, kind) if outer and bones else ():
+            off, rounding = (float(np.linalg.norm(one)) for one in (carried[i] - load, _ROUNDING * load))
+            yield RunCheck(f"{kind}s that bones do not carry", off, allowed * arm + rounding, unit, run.numbers[i])
+
+
+def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, Floats]]:
+    """The sum (3,) of external loads by index of the frame: as recorded, and forces that do not depend on the deformation."""
+    if f"load_{kind}_x" in run.scalars:
+        yield from enumerate(scalar_vectors(run.scalars, "load_", kind))
+    for i, number in enumerate(run.numbers if kind == "force" else ()):
+        if (load := external_load(problem, number)) is not None:
+            yield i, load.force
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
@@ -228,15 +236,14 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
     allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    contact, rest = problem.contact, run.surface
+    rest = run.surface
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
-    for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
+    for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
-        for bone in bones:
-            check_of = partial(
-                _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
-            )
+        for bone in problem.obstacles:
+            give = _give(problem, bone, float(pressures[i]))
+            check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)

@@ -4,13 +4,13 @@ import hashlib
 import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from fem_reference.assessment import run_checks
 from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import amend
@@ -39,9 +39,7 @@ def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
     checks = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
     outcome = confirmed(replace(run.outcome, status="converged", message=message), checks)
-    facts = [
-        asdict(one) | {"value": finite(one.value), "allowed": finite(one.allowed), "met": one.met} for one in checks
-    ]
+    facts = [plain(one) | {"met": one.met} for one in checks]
     seconds = time.process_time() - begin
     origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "checks": facts}}
     if run.folder is not None:

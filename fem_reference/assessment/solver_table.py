@@ -120,6 +120,10 @@ class Table:
     versions: dict[str, str]
     machines: tuple[str, ...]
 
+    def _by(self, kind: str, name: str) -> list[SolverResult]:
+        """The results of a solver."""
+        return [one for one in self.results if (one.kind, one.name) == (kind, name)]
+
     def of(self, kind: str, case: str) -> list[SolverResult]:
         """The results of a kind on a case."""
         return [one for one in self.results if (one.kind, one.case) == (kind, case)]
@@ -130,12 +134,12 @@ class Table:
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
         """The parameters that ``name`` needs on the scene where they are most; empty where that is not known."""
-        found = [one.needs for one in self.results if (one.kind, one.name) == (kind, name)]
+        found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
         """The worst frames of ``name`` over all scenarios; None where it was not measured."""
-        mine = [one for one in self.results if (one.kind, one.name) == (kind, name)]
+        mine = self._by(kind, name)
         found = [(value[0], one.case) for one in mine if (value := one.worst(metric, statistic)) is not None]
         finite = [(value, case) for value, case in found if not np.isnan(value)]
         lost = tuple(case for value, case in found if np.isnan(value))
@@ -152,10 +156,7 @@ class Table:
 
     def speed(self, kind: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario with the most triangles for which the time per frame [s] of ``name`` is known, and that time."""
-        times = {
-            one.case: one.seconds_per_frame
-            for one in self.results
-            if (one.kind, one.name) == (kind, name) and one.seconds_per_frame is not None
-        }
+        known = {one.case: one.seconds_per_frame for one in self._by(kind, name)}
+        times = {case: seconds for case, seconds in known.items() if seconds is not None}
         largest = max((one for one in self.scenarios if one.case in times), key=lambda one: one.triangles, default=None)
         return None if largest is None else (largest, times[largest.case])

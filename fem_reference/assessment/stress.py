@@ -10,7 +10,7 @@ from pydantic import Field
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 
 Verdict = Literal["ok", "degraded", "failed", "refused", "inconclusive"]
 VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconclusive")
@@ -173,13 +173,11 @@ def _decisive(cell: Cell, weighed: Weighed) -> Cell:
 def facts(stress: Stress) -> dict[str, Any]:
     """The contents of pages, except pictures, as valid JSON."""
     cells = [{name: value for name, value in vars(cell).items() if name not in _PICTURED} for cell in stress.cells]
-    for cell in cells:
-        cell |= {name: None if cell[name] is None else finite(cell[name]) for name in ("value", "bound")}
     return {
         "format": 1,
         "cases": [vars(case) | {"bounds": [bound.model_dump() for bound in case.bounds]} for case in stress.cases],
         "solvers": list(stress.solvers),
-        "cells": cells,
+        "cells": plain(cells),
         "seconds": stress.seconds,
         "origin": stress.origin,
     }

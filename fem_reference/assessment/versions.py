@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline
+from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
@@ -61,8 +62,7 @@ class Change:
     @property
     def greatest(self) -> tuple[float, float]:
         """The greatest earlier and present distance from the reference, NaN without a number."""
-        was, now = (np.abs(values[np.isfinite(values)]) for values in (self.was, self.now))
-        return float(was.max()) if len(was) else math.nan, float(now.max()) if len(now) else math.nan
+        return greatest(np.abs(self.was)), greatest(np.abs(self.now))
 
     @property
     def in_bars(self) -> float:

@@ -145,7 +145,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def unturned(options: argparse.Namespace, word: str) -> list[str]:
-    """A line where the negative control was to turn the verdict, and did not."""
+    """A line for a negative control that did not turn the verdict to fail; empty otherwise."""
     if not options.negative_control or word == "fail":
         return []
     why = "what it changes is not judged here (compare judges candidates too), or matters too little"

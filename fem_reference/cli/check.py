@@ -1,6 +1,6 @@
-"""The verb ``check``: a candidate against its own past and against the reference, for the author's pipeline.
+"""The verb ``check``: a candidate against its own earlier results and against the reference, for the author's pipeline.
 
-An inconclusive result has exit status 0: an uncertain reference is no fault of the change that is checked. The text, the
+An inconclusive result has exit status 0: an uncertain reference is not the fault of the change that is checked. The text, the
 Markdown and the JUnit file (as skipped) say so.
 """
 
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge a candidate by its baseline, after having written that anew where it is asked for."""
+    """Judge a candidate by its baseline, which ``--update`` writes first."""
     begin = time.perf_counter()
     scene = casefile.muscle(scene_of(options), "CASE")
     entry, place = choose(scene, options.candidate, options.unit)
@@ -49,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
         facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
-        lost = regression_texts.lost(scene.name, candidate.name, why)
-        write(options.junit, lost.junit)
-        write(options.markdown, lost.markdown)
+        junit, markdown = regression_texts.lost(scene.name, candidate.name, why)
+        write(options.junit, junit)
+        write(options.markdown, markdown)
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.offered(bench, reference, asked=options.error_bar)

@@ -1,4 +1,4 @@
-"""The verb ``compare``: candidates against the reference, or one of them against what it was."""
+"""The verb ``compare``: candidates against the reference, or one of them against its earlier version."""
 
 import argparse
 from pathlib import Path
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure the one candidate and what it was, and write the page of what changed."""
+    """Measure the one candidate and its earlier version, and write the page of changes."""
     scene = casefile.muscle(case, "--against")
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")

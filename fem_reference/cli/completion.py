@@ -19,7 +19,7 @@ _ALIASES = {
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The shell; it writes nothing into ``--out``."""
+    """Option for the shell; it writes nothing into ``--out``."""
     parser.add_argument(
         "shell", metavar="SHELL", choices=sorted(_ALIASES), help=f"one of {', '.join(sorted(_ALIASES))}"
     )
@@ -27,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the script; it is made of the command line as it is now."""
+    """Print the script, made from the present command line."""
     text = script(options.shell)
     write_output({"shell": options.shell, "script": text}, text.rstrip(), options)
     return DONE

@@ -20,7 +20,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a case with each thing left out that can be, and write the page."""
+    """Solve a case with each optional part left out, and write the page."""
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))

@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Say what there is."""
+    """Print the lists."""
     scenes = [casefile.read(name) for name in casefile.cases()]
     data = {scene.name: missing for scene in scenes if (missing := _data(scene)) is not None}
     known, runs = {name: _settings(name) for name in solvers.names()}, (out(options) / "runs").rglob("run.json")

@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting; the exit status is 1 where none meets what is asked."""
+    """Recommend a setting; the exit status is 1 where none meets the request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}

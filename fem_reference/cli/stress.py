@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
+    """Run them all and write the page; a run that fails is a result, not a failure of the verb."""
     if options.jitters < 0:
         raise InputError("--jitters", options.jitters, "0 or more")
     for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):

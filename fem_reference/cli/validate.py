@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
         casefile.read(options.case, with_negative_control=True)
     bench = checked_bench(scene, options, own_candidates(scene))
     for choice, place in [(scene.reference, "reference"), *own_candidates(scene)]:
-        solvers.require(choice.solver, bench.settings(choice, place), place, scene.task)
+        solvers.find(choice.solver, place, scene.task).require(bench.settings(choice, place))
     body = bench.problem().body
     facts: dict[str, Any] = {"case": scene.name, "read": scene.place, "mesh": bench.problem().mesh_facts}
     facts |= of_case.known(scene, bench.setup())

@@ -12,7 +12,7 @@ never branches on a parameter and uses it with operators and ``state.functions``
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -23,8 +23,9 @@ from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.material_point import State as State
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
@@ -77,11 +78,11 @@ class Effect(Record):
         """The stiffness that it gives the body at rest."""
         return Moduli()
 
-    def resultant(self, volume: float, area: Callable[[str], float]) -> Floats | None:  # noqa: ARG002
-        """The force (3,) [N] of its full amount on a whole body of this ``volume`` [mm3] and, by region, ``area`` [mm2], both at
-        rest; None where that depends on the deformation.
+    def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
+        """The force and moment of its full amount on a whole body of this ``shape``; None where they are unknown or depend on
+        more, such as velocities within a load step.
         """
-        return None if self.outer else np.zeros(3)
+        return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
         """The evidence that a scene needs it, known before a solution; None for a part of the material, which is always
@@ -150,8 +151,9 @@ class PassiveFibres(Energy):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The tension of the fibres at the greatest expected stretch, against the matrix."""
-        pull = fibre_tension(self, scene.stretch[1])
-        return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)))
+        greatest = scene.stretch[1]
+        pull = fibre_tension(self.energy, greatest)
+        return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
 class Load(Effect):
@@ -201,19 +203,8 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
-    """The indicator of fibres that ``pull`` [MPa] at the muscle, by which its surface moves by a ``distance`` [mm]."""
+    """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
     return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
-
-
-def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
-    """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of the energy."""
-
-    def energy(along: float) -> float:
-        across = along**-0.5
-        F = ((along, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
-        return float(effect.energy(State(F=F, pressure=0.0, fibre=(1.0, 0.0, 0.0))))
-
-    return (energy(stretch + step) - energy(stretch - step)) / (2 * step)
 
 
 @dataclass(frozen=True)

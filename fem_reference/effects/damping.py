@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
 from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.units import VolumeDamping
 
 
@@ -32,6 +33,11 @@ class Damping(Energy):
             scene.lag(scene.bend(sideways) + scene.draw(force)),
             force * scene.length,
         )
+
+    def resultant(self, shape: Shape) -> Wrench | None:
+        """The drag on the whole body."""
+        found = shape.motion()
+        return None if found is None else Wrench(*(-self.coefficient * one for one in found))
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

@@ -1,14 +1,13 @@
 """Weight, or any other steady acceleration."""
 
 import math
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.loads import Shape, Wrench, dead
 from fem_reference.foundations.units import AccelerationVector, Density
 
 
@@ -33,9 +32,9 @@ class Gravity(Ramped, Energy):
             force * scene.length,
         )
 
-    def resultant(self, volume: float, area: Callable[[str], float]) -> Floats:  # noqa: ARG002
+    def resultant(self, shape: Shape) -> Wrench:
         """The weight."""
-        return self.density * volume * np.array(self.acceleration)
+        return dead(self.density * np.array(self.acceleration), shape)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

@@ -6,7 +6,7 @@ from fem_reference.effects import State, VolumeLaw
 
 
 class IncompressiblePenalty(VolumeLaw):
-    """``K/2 (J - 1)^2``: what ``incompressible`` is where its pressure is free at every point.
+    """``K/2 (J - 1)^2``: ``incompressible`` with a pressure that is free at every point.
 
     ``bulk``: bulk modulus K [MPa]. Valid for J from 1/2 to 2, for the reasons of ``incompressible``.
     """

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
 from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.foundations.loads import Shape, Wrench
 
 
 class Pressure(Ramped, Load):
@@ -13,9 +14,9 @@ class Pressure(Ramped, Load):
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
 
-    All round a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. What is attached
-    exactly keeps its size, and the body around it is sheared: a cube of side L with one clamped triangle, whose legs are a, keeps
-    0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
+    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. What
+    is attached exactly keeps its size, and the body around it is sheared: a cube of side L with one clamped triangle, whose legs
+    are a, keeps 0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
@@ -26,6 +27,11 @@ class Pressure(Ramped, Load):
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
+
+    def resultant(self, shape: Shape) -> Wrench | None:
+        """The load on the whole part as it is now."""
+        found = shape.facing(self.on)
+        return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""

@@ -1,14 +1,12 @@
 """A dead load: a force on a part of the surface with constant direction and size."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
-
-import numpy as np
 
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.loads import Shape, Wrench, dead
 from fem_reference.foundations.units import PressureVector
 
 
@@ -27,9 +25,9 @@ class Traction(Ramped, Load):
         part = load / scene.shear
         return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)
 
-    def resultant(self, volume: float, area: Callable[[str], float]) -> Floats:  # noqa: ARG002
+    def resultant(self, shape: Shape) -> Wrench:
         """The load on the whole part."""
-        return area(self.on) * np.array(self.force)
+        return dead(self.force, shape, self.on)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
         """Force per rest area [MPa], (3,)."""

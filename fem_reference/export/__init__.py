@@ -25,7 +25,7 @@ _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the
 def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
-    ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
+    ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. InputError where the folder is
     not free, or FEBio has not the same.
     """
     if not isinstance(form, str) or form not in FORMATS:

@@ -1,8 +1,8 @@
 """A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
 Written from FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and
-write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same and what was seen.
-Time is the frame number minus the first.
+write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same, with measured differences. Time is the
+frame number minus the first.
 """
 
 from math import ceil
@@ -38,7 +38,7 @@ TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
 def check(case: MuscleCase) -> None:
-    """InputError where a case has an effect that FEBio has not, or not in the same form."""
+    """Raise InputError where FEBio lacks an effect of the case, or has it in another form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             same = ", ".join(name_of(kind) for kind in SAME)
@@ -56,7 +56,7 @@ def check(case: MuscleCase) -> None:
 
 
 def write(problem: MuscleProblem, folder: Path) -> None:
-    """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
+    """``scene.feb`` and, for readers of FEBio's nodes, ``tet10.csv`` into ``folder``."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)

@@ -1,13 +1,14 @@
 """The nodes, elements, node sets and surfaces of FEBio's input file."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, corner_areas, enclosed_volume
 from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
@@ -15,6 +16,10 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is turned round
+# Springs at points are small rigid triangles of this share of the points' areas, with a penalty that is as much greater.
+SHRUNK = 0.01
+_LEAST_AREA = 1e-6  # of the greatest: a point of less has no spring
+_CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
@@ -67,12 +72,6 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def obstacles(problem: MuscleProblem) -> list[Bone]:
-    """The bones in contact with the muscle."""
-    contact = problem.contact
-    return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
-
-
 def outward(surface: Surface) -> Surface:
     """The surface with its normals pointing out of it."""
     turned = enclosed_volume(surface.points, surface.triangles) < 0
@@ -99,6 +98,34 @@ def free_facets(problem: MuscleProblem) -> Ints:
     return felt
 
 
+class SpringPoints(NamedTuple):
+    """Points of springs on the tetrahedra: ``of`` (n,) those of the attached skin, the nearest ``points`` (n, 3) [mm] to these on
+    boundary ``facets`` (n, 3), and small triangles with ``corners`` (n, 3, 3) [mm] about them that face these.
+    """
+
+    of: Ints
+    points: Floats
+    facets: Ints
+    corners: Floats
+
+
+def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
+    """The points of springs that stand at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so that a
+    triangle of ``SHRUNK`` of a point's area, in the plane of its facet, is a spring at that point.
+    """
+    skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
+    of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))
+    near = distances(skin.points[of], Surface(problem.mesh.points, outer))
+    corners = problem.mesh.points[outer[near.triangle]]
+    scale = np.sqrt(SHRUNK * skin.areas[of] / corner_areas(corners))[:, None]
+    least = scale / 3 + _CLEAR
+    more = np.maximum(near.barycentric - least, 0.0)  # what is above the least, as much of it as all shares leave
+    inside = least + more * (1 - 3 * least) / more.sum(axis=1, keepdims=True)
+    points = np.einsum("nc,nci->ni", inside, corners)
+    small = points[:, None] + scale[:, :, None] * (corners - corners.mean(axis=1, keepdims=True))
+    return SpringPoints(of, points, outer[near.triangle], small[:, FACING[:3]])
+
+
 class Mesh:
     """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
 
@@ -115,7 +142,7 @@ class Mesh:
         for bone in self.problem.bones:
             surface = outward(bone.surface)
             groups.append((bone_id(bone), "tri3", surface.points, surface.triangles))
-        groups += [(springs_id(attached), "tri6", *self._copy(attached)) for attached in by_springs(self.problem)]
+        groups += [(springs_id(attached), *self._copy(attached)) for attached in by_springs(self.problem)]
         before = np.cumsum([0, *(len(points) for _, _, points, _ in groups[:-1])])
         cells = {name: own + first for (name, _, _, own), first in zip(groups, before, strict=True)}
         for (name, _, points, _), first in zip(groups, before.tolist(), strict=True):
@@ -125,7 +152,7 @@ class Mesh:
             rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), number)
             number += len(cells[name])
         self._attached(mesh)
-        if obstacles(self.problem):
+        if self.problem.obstacles:
             self._contact_surface(mesh, cells)
         for attached in by_springs(self.problem):
             self._tied(mesh, attached, cells[springs_id(attached)])
@@ -137,13 +164,20 @@ class Mesh:
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
     def _area(self, attached: AttachedVertices) -> Ints:
-        """The triangles (m, 6) of an attachment, outward."""
+        """The triangles (m, 6) of an attachment, outward; of springs at points those with points on them."""
+        if attached.attachment in self.problem.attached_skins:
+            return self._curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
         return self._curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
 
-    def _copy(self, attached: AttachedVertices) -> tuple[Floats, Ints]:
-        """Points (n, 3) [mm] and triangles (m, 6) that coincide with the area attached and face it, as FEBio's pairs must."""
+    def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
+        """Kind, points (n, 3) [mm] and triangles that coincide with the area attached, or with parts of it about the points of
+        springs, and face it, as FEBio's pairs must.
+        """
+        if attached.attachment in self.problem.attached_skins:
+            corners = spring_points(self.problem, attached).corners.reshape(-1, 3)
+            return "tri3", corners, np.arange(len(corners)).reshape(-1, 3)
         used, triangles = np.unique(self._area(attached)[:, FACING], return_inverse=True)
-        return self.points[used], triangles.reshape(-1, 6)
+        return "tri6", self.points[used], triangles.reshape(-1, 6)
 
     def _attached(self, mesh: Element) -> None:
         taken: set[int] = set()
@@ -156,7 +190,7 @@ class Mesh:
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
         """The contact surface, and its pairs with the bones."""
         self._surface(mesh, "muscle_free", "tri6", self._curved(free_facets(self.problem)))
-        names = [bone_id(bone) for bone in obstacles(self.problem)]
+        names = [bone_id(bone) for bone in self.problem.obstacles]
         for name in names:
             self._surface(mesh, f"{name}_surface", "tri3", cells[name])
         for name in names:
@@ -166,7 +200,7 @@ class Mesh:
         """The area attached and its rigid copy, the primary one: FEBio integrates over that."""
         name = springs_id(attached)
         self._surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
-        self._surface(mesh, f"{name}_bone", "tri6", copy)
+        self._surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)
         self._pair(mesh, f"{name}_pair", f"{name}_bone", f"{name}_muscle")
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""The folder that an export is written into: one that was not there, whole or not at all."""
+"""The folder of an export: a new one, written whole or not at all."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ from fem_reference.io import files
 
 
 def check(folder: Path) -> None:
-    """InputError unless ``folder`` is free to be written: not there, or empty."""
+    """Raise InputError unless ``folder`` is missing or empty."""
     if folder.is_file():
         raise InputError("--to", f'"{folder}", a file', "a folder that is not there yet, or empty")
     if folder.is_dir() and any(folder.iterdir()):

@@ -21,13 +21,13 @@ _VECTORS = ("force_{}_N", "at_{}_mm", "moment_{}_N_mm")
 COLUMNS = (
     *("run", "frame", "bone", "joint", "angle_deg"),
     *(name.format(axis) for name in _VECTORS for axis in "xyz"),
-    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS)),
+    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS), "moment_arm_by_force_mm"),
 )
 _NOWHERE = np.zeros(3)
 
 
 def write_table(comparison: Comparison, path: Path) -> None:
-    """Write a row for each run, frame and bone that has a force or a joint; what is not known is left empty."""
+    """Write a row for each run, frame and bone that has a force or a joint; unknown values are left empty."""
     found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
     write_csv(path, COLUMNS, (["" if value != value else value for value in row] for row in found))
 
@@ -46,7 +46,8 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
     about = lost[:, 0] if joint is None else moment @ joint.axis
     angles = lost[:, 0] if joint is None else np.degrees(joint.angles(numbers))
     alone = turning(setup.joints, context, numbers) == i
-    measures = [find(comparison.changes[run.name], "moment_arm", one) for one in _ARMS]
+    names = [*(("moment_arm", one) for one in _ARMS), ("joint_moment", "arm")]
+    measures = [find(comparison.changes[run.name], *name) for name in names]
     arms = np.array([lost[:, 0] if one is None else np.where(alone, one.values, np.nan) for one in measures])
     columns = np.column_stack([angles, force, at, moment, about, arms.T]).tolist()
     for number, values in zip(numbers, columns, strict=True):
@@ -64,7 +65,7 @@ def has_force(run: Run, bone: Bone) -> bool:
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
     """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0: on its central axis, about which no moment
-    is left but that along the force, nearest to the middle of what is attached to the bone; of what is not, to the origin.
+    is left but that along the force, nearest to the middle of its attachment; of a bone without one, to the origin.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)

@@ -1,4 +1,4 @@
-"""A problem in formats that anybody reads: PLY, VTU, MSH, VTK, CSV, JSON. Lengths in mm, indices from 0."""
+"""A problem in common formats: PLY, VTU, MSH, VTK, CSV, JSON. Lengths in mm, indices from 0."""
 
 import csv
 import io

@@ -64,7 +64,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
 
 
 class _Frames:
-    """The blocks of every frame of a comparison, with what they have in common."""
+    """The blocks of every frame of a comparison, with their common data."""
 
     def __init__(self, comparison: Comparison) -> None:
         assert isinstance(comparison.context, MeasurementContext)  # of a muscle

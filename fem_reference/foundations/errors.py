@@ -9,7 +9,7 @@ _SHOWN = 400
 
 
 class InputError(Exception):
-    """Input that is not usable: the place (file and key), what was got and what is wanted.
+    """Unusable input: the place (file and key), what was got and what is wanted.
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'

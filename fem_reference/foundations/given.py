@@ -1,4 +1,4 @@
-"""Arguments of callers from Python, whatever they are: in words for messages, or as a path."""
+"""Arguments of callers from Python, of any type: in words for messages, or as a path."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ def said(value: object) -> str:
 
 
 def path(given: Any, place: str) -> Path:
-    """The path that is ``given``, there or not; InputError where there can be none."""
+    """The ``given`` path, whether it exists or not; InputError where it cannot be a path."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(place, said(given), "a path")
     try:

@@ -24,7 +24,7 @@ class Indicator:
 
 @dataclass(frozen=True)
 class Near:
-    """Nearness of the free surface to a bone: the guaranteed clearance ``gap`` [mm], whatever the error of the guess of where the
+    """Nearness of the free surface to a bone: the guaranteed clearance ``gap`` [mm], for any error of the guess of where the
     surface goes; the possible penetration ``depth`` [mm], root mean square over the surface at the worst frame; and the first
     ``frame`` with the smallest gap.
     """

@@ -1,4 +1,4 @@
-"""Numbers that carry their first and second derivatives: what is computed with them is differentiated without rounding of steps."""
+"""Numbers with their first and second derivatives: whatever is computed from them is differentiated exactly, without steps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,29 +12,33 @@ from fem_reference.foundations.mesh import Floats
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,).
+    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,); the
+    curvature is None where nobody asks for it, which saves nine tenths of the work.
 
-    Along the points, a slope or curvature that is the same at all has length 1; what a jet is combined with has as many axes as
+    Along the points, a slope or curvature that is the same at all has length 1; values combined with a jet have as many axes as
     its points, or none.
     """
 
     value: Any
     slope: Any
-    curvature: Any
+    curvature: Any = None
 
     __array_ufunc__ = None  # an array on the left leaves it to the jet
 
     def chained(self, value: Any, first: Any, second: Any) -> "Jet":
         """A function of the jet, whose ``value``, ``first`` and ``second`` derivative at ``self.value`` are given."""
+        if self.curvature is None:
+            return Jet(value, first * self.slope, None)
         outer = self.slope[:, None] * self.slope[None]
         return Jet(value, first * self.slope, first * self.curvature + second * outer)
 
     def __neg__(self) -> "Jet":
-        return Jet(-self.value, -self.slope, -self.curvature)
+        return self * -1.0
 
     def __add__(self, other: Any) -> "Jet":
         if isinstance(other, Jet):
-            return Jet(self.value + other.value, self.slope + other.slope, self.curvature + other.curvature)
+            curvature = None if self.curvature is None else self.curvature + other.curvature
+            return Jet(self.value + other.value, self.slope + other.slope, curvature)
         return Jet(self.value + other, self.slope, self.curvature)
 
     def __sub__(self, other: Any) -> "Jet":
@@ -45,10 +49,15 @@ class Jet:
 
     def __mul__(self, other: Any) -> "Jet":
         if not isinstance(other, Jet):
-            return Jet(self.value * other, self.slope * other, self.curvature * other)
+            return Jet(
+                self.value * other, self.slope * other, None if self.curvature is None else self.curvature * other
+            )
+        value, slope = self.value * other.value, self.value * other.slope + other.value * self.slope
+        if self.curvature is None:
+            return Jet(value, slope, None)
         mixed = self.slope[:, None] * other.slope[None]
         curvature = self.value * other.curvature + other.value * self.curvature + mixed + np.swapaxes(mixed, 0, 1)
-        return Jet(self.value * other.value, self.value * other.slope + other.value * self.slope, curvature)
+        return Jet(value, slope, curvature)
 
     def __pow__(self, exponent: float) -> "Jet":
         first = exponent * self.value ** (exponent - 1) if exponent else 0.0
@@ -64,16 +73,17 @@ class Jet:
     __radd__, __rmul__ = __add__, __mul__
 
 
-def variables(values: Floats) -> list[Jet]:
-    """The n variables themselves, at points where they have ``values`` (n, ...)."""
+def variables(values: Floats, *, curved: bool = True) -> list[Jet]:
+    """The n variables as jets, at points where they have ``values`` (n, ...); without curvatures where not ``curved``."""
     count, along = len(values), (1,) * (values.ndim - 1)
-    slopes = np.eye(count).reshape(count, count, *along)
-    return [Jet(value, slope, np.zeros((count, count, *along))) for value, slope in zip(values, slopes, strict=True)]
+    slopes, flat = np.eye(count).reshape(count, count, *along), np.zeros((count, count, *along)) if curved else None
+    return [Jet(value, slope, flat) for value, slope in zip(values, slopes, strict=True)]
 
 
 def constant(value: Any, like: Jet) -> Jet:
     """A constant as a jet in the variables of ``like``."""
-    return Jet(value + np.zeros_like(like.value), np.zeros_like(like.slope), np.zeros_like(like.curvature))
+    curvature = None if like.curvature is None else np.zeros_like(like.curvature)
+    return Jet(value + np.zeros_like(like.value), np.zeros_like(like.slope), curvature)
 
 
 def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable[[Any], Any]:
@@ -92,7 +102,7 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     if like is None:
         return np.where(chosen, then, otherwise)
     one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
-    parts = ("value", "slope", "curvature")
+    parts = ("value", "slope") if one.curvature is None else ("value", "slope", "curvature")
     return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
 
 

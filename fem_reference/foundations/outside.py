@@ -1,4 +1,4 @@
-"""Effects of one's own: files outside the package, in the folders that the setting FEM_REFERENCE_EFFECTS lists."""
+"""Effects of users: files outside the package, in the folders that the setting FEM_REFERENCE_EFFECTS lists."""
 
 import os
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def folders() -> list[str]:
-    """The folders that the setting lists, which are divided as those of PATH are."""
+    """The folders that the setting lists, separated as in PATH."""
     return [str(Path(folder).absolute()) for folder in os.environ.get(SETTING, "").split(os.pathsep) if folder]
 
 
@@ -31,6 +31,6 @@ def only_record(module: ModuleType, places: Sequence[str], kinds: tuple[type[Rec
 
 
 def source(module: ModuleType) -> bytes:
-    """The content of the file of a ``module`` outside the package, and nothing of one inside: its code counts elsewhere."""
+    """The content of the file of a ``module`` outside the package; empty for one inside, whose code is hashed elsewhere."""
     file = Path(str(module.__file__)).resolve()
     return b"" if file.is_relative_to(_PACKAGE) else file.read_bytes()

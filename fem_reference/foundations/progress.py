@@ -12,7 +12,7 @@ Progress = Callable[[str], object]
 
 @contextmanager
 def reported(progress: Progress | None) -> Iterator[None]:
-    """Meanwhile each line of progress goes to ``progress``; InputError unless it can be called, or is None."""
+    """A context in which each line of progress goes to ``progress``; InputError unless it can be called, or is None."""
     if progress is None:
         yield
         return

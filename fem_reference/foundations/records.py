@@ -15,7 +15,7 @@ from fem_reference.foundations.errors import InputError
 class Record(BaseModel):
     """A frozen record whose keys are all known, whose values have the type stated, and whose numbers are finite.
 
-    Text and truth values are no numbers; an integer where a float is wanted is one.
+    Text and truth values are not accepted as numbers; an integer is accepted where a float is wanted.
     """
 
     model_config = ConfigDict(
@@ -50,7 +50,7 @@ def directed(vector: tuple[float, float, float], name: str) -> tuple[float, floa
 
 
 def check_name(name: str) -> str:
-    """The ``name``; ValueError where nothing can be called so."""
+    """The ``name``; ValueError where it cannot be a name."""
     if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
         raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and signs, without blanks at its ends")
     return name
@@ -90,7 +90,7 @@ def _own(errors: Sequence[Any]) -> list[Any]:
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error that says all that is ``wrong``, the first at length; what is wrong with one key is said once."""
+    """One error that says all that is ``wrong``, the first at length; each key once."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -149,7 +149,7 @@ def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
 
 
 def keys(record: Any) -> list[str]:
-    """The keys that files have of a ``record``; none of what is no record."""
+    """The keys of a ``record`` in files; none where it is not a record."""
     fields = getattr(record, "model_fields", {})
     return sorted(field.alias or name for name, field in fields.items() if not field.exclude)
 

@@ -49,7 +49,7 @@ def _watch(process: int) -> None:
 
 
 def lives(process: int) -> bool:
-    """True of a process that runs; one that ended and whose end nobody has taken note of does not live."""
+    """True for a process that runs; one that ended and whose end nobody has taken note of does not live."""
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"

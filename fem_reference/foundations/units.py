@@ -164,7 +164,7 @@ def unit_of(metadata: Sequence[object]) -> str:
 
 
 def written(value: Any, unit: str) -> Any:
-    """A number, or three, as text with the ``unit`` that it has inside; what has no unit, or is text, as it is.
+    """A number, or three, as text with the ``unit`` that it has inside; values without a unit, and texts, unchanged.
 
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)

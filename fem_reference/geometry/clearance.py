@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, minimum_filter
 
 from fem_reference.foundations.mesh import Floats
 
@@ -65,8 +65,4 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """The least of four neighbours along each axis, which gets shorter by three."""
-    for axis in range(values.ndim):
-        windows = [values[(slice(None),) * axis + (slice(i, values.shape[axis] - 3 + i),)] for i in range(4)]
-        pairs = np.minimum(windows[0], windows[1]), np.minimum(windows[2], windows[3])
-        values = np.minimum(*pairs)
-    return values
+    return np.asarray(minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

@@ -63,15 +63,13 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
     return found
 
 
-def fourier(points: Floats, harmonics: int | None = None) -> Curve:
+def fourier(points: Floats) -> Curve:
     """The discrete Fourier series of ``points`` (n, d), which count as equidistant and periodic beside their chord (3.4, 3.5).
 
     The straight line between both ends is taken off first and the rest continued as an odd function, so that the ends are met.
-    ``harmonics``: the number of sines kept, at most n - 2; all interpolate.
     """
     count = len(knots(points)) - 1
-    kept = count - 1 if harmonics is None else min(harmonics, count - 1)
-    orders, at = np.arange(1, kept + 1), np.linspace(0, 1, count + 1)
+    orders, at = np.arange(1, count), np.linspace(0, 1, count + 1)
     chord = linear(points[[0, -1]])
     weights = 2 / count * np.sin(np.pi * np.outer(orders, at)) @ (points - chord(at))
     return lambda t: chord(t) + np.sin(np.pi * np.outer(t, orders)) @ weights

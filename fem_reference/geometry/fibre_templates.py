@@ -14,10 +14,9 @@ from scipy.stats import qmc
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, normals
-from fem_reference.geometry.cross_sections import CrossSection, cross_section
+from fem_reference.geometry.cross_sections import CrossSection, carried, cross_section
 from fem_reference.geometry.curves import bezier
 from fem_reference.geometry.fibres import POINTS, FibreField, resample
-from fem_reference.geometry.section_rims import carried
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing lays a parabola

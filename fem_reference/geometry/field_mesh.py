@@ -131,17 +131,14 @@ def refined(mesh: FieldMesh) -> FieldMesh:
     """Every interval cut in two, every triangle in four, at the middles of the edges; vertex i stays vertex i, edge j becomes
     vertex n + j.
     """
-    count, edges = len(mesh.points), mesh.edges
-    points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)])
-    middle = count + mesh.edge_numbers(_all_edges(mesh.cells)).reshape(len(mesh.cells), -1)
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
-        (a, b), (ab,) = mesh.cells.T, middle.T
+        a, b, ab = nodes(mesh, 2).T
         cells = [(a, ab), (ab, b)]
     else:
-        (a, b, c), (ab, bc, ca) = mesh.cells.T, middle.T
+        a, b, c, ab, bc, ca = nodes(mesh, 2).T
         cells = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return FieldMesh(points, np.concatenate([np.stack(cell, axis=1) for cell in cells]), mesh.place)
+    return FieldMesh(mesh.nodes[2], np.concatenate([np.stack(cell, axis=1) for cell in cells]), mesh.place)
 
 
 def _all_edges(cells: Ints) -> Ints:

@@ -1,6 +1,5 @@
 """Tetrahedra and other arrays stored on disk, as they take long to make: written atomically, made anew where damaged."""
 
-import importlib.metadata
 import logging
 import tempfile
 from collections.abc import Callable, Mapping
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
+from fem_reference.foundations.version import versions
 
 log = logging.getLogger(__name__)
 
@@ -39,13 +39,7 @@ def code() -> str:
     """A hash of all source files here, and of the versions of the packages that make meshes."""
     folder = Path(__file__).parent
     sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
-    versions = dict[str, str]()
-    for package in _MADE_WITH:
-        try:
-            versions[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            versions[package] = "none"
-    return f"{fingerprint(*sources)} {versions}"
+    return f"{fingerprint(*sources)} {versions(_MADE_WITH)}"
 
 
 def _mesh(arrays: Arrays) -> TetMesh:

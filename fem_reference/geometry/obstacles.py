@@ -1,11 +1,14 @@
 """Smooth obstacles of paths, ellipsoids and cylinders as quadrics, and tori: levels, gradients, second derivatives."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
+
+# A point this near to the middle of an obstacle, as a share of its size, leaves it by a direction that is chosen for it.
+_MIDDLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,31 +20,6 @@ class Touch:
     into: Floats
     left: Floats
     out: Floats
-
-
-class SmoothSurface(Protocol):
-    """A smooth surface where ``level`` is 0, inside which it is negative."""
-
-    @property
-    def bend(self) -> float:
-        """The smallest radius of curvature [mm]."""
-        ...
-
-    def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) and gradients (n, 3) at ``points`` (n, 3)."""
-        ...
-
-    def moved(self, pose: Floats) -> Self:
-        """The surface where a ``pose`` (4, 4) takes it."""
-        ...
-
-    def bending(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
-        ...
-
-    def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +53,10 @@ class Quadric:
 
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface along its normal, from deep inside first away from the axis."""
-        own = self._own(points)
+        own, thin = self._own(points), int(np.argmin(self.radii))
+        own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
-        scale = np.where(np.isfinite(self.radii), (0.8 / np.clip(size, 1e-9, 0.8))[:, None], 1.0)
+        scale = np.where(np.isfinite(self.radii), (0.8 / np.clip(size, _MIDDLE, 0.8))[:, None], 1.0)
         moved = (own * scale) @ self.pose[:3, :3].T + self.pose[:3, 3]
         inside = size < 1
         for _ in range(3):
@@ -126,8 +105,9 @@ class Ring:
         """The ``points`` (n, 3), those inside moved to the surface, away from the circle."""
         middle = self._nearest(points)
         across = points - middle
+        across[np.linalg.norm(across, axis=1) < _MIDDLE * self.tube] = _MIDDLE * self.tube * self.pose[:3, 2]
         size = np.linalg.norm(across, axis=1)[:, None]
-        return np.asarray(middle + across * np.maximum(self.tube / np.maximum(size, 1e-9), 1.0))
+        return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
         """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the middles of those that do not."""
@@ -141,12 +121,18 @@ class Ring:
         return np.where(crosses[:, None], inner, point)
 
     def _outward(self, points: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) and distances (n,) from the axis."""
+        """Unit vectors (n, 3) and distances (n,) from the axis; from a point on it along the first axis of the pose."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
-        away = np.maximum(np.linalg.norm(flat, axis=1), 1e-12)
+        away = np.linalg.norm(flat, axis=1)
+        flat[away < _MIDDLE * self.radius] = _MIDDLE * self.radius * self.pose[:3, 0]
+        away = np.maximum(away, _MIDDLE * self.radius)
         return flat / away[:, None], away
 
     def _nearest(self, points: Floats) -> Floats:
         """The points (n, 3) of the circle nearest to ``points`` (n, 3)."""
         return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])
+
+
+# A smooth surface where its level is 0, inside which that is negative.
+SmoothSurface = Quadric | Ring

@@ -9,6 +9,7 @@ from scipy.sparse import coo_array
 from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, unit_normals
 from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.edges import Edges
 
 Bools = NDArray[np.bool_]
 
@@ -63,10 +64,9 @@ def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
 
 def _rim_edges(parts: Parts) -> Ints:
     """The edges (e, 2) between triangles of different labels."""
-    ends = np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    labels = np.repeat(parts.labels, 3)[np.lexsort(ends.T)].reshape(-1, 2)
-    pairs = ends[np.lexsort(ends.T)].reshape(-1, 2, 2)
-    return np.asarray(pairs[labels[:, 0] != labels[:, 1], 0])
+    edges = Edges.of(parts.surface)
+    left, right = parts.labels[edges.beside].T
+    return np.asarray(edges.ends[left != right])
 
 
 def _along_rims(parts: Parts) -> Floats:

@@ -1,6 +1,5 @@
-"""Sums of radial basis functions for scattered values, with centres by grid, Halton, greedy search or features (report 3.5)."""
+"""Sums of Gaussians for scattered values, with centres by grid, Halton, greedy search or features (report 3.5)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +10,10 @@ from scipy.stats import qmc
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 
-# From distances times the shape parameter to values: Gauss, and Wendland's of compact support and class C2 (1995,
-# doi 10.1007/BF02123482).
-KERNELS: dict[str, Callable[[Floats], Floats]] = {
-    "gaussian": lambda r: np.exp(-(r**2)),
-    "wendland": lambda r: np.maximum(1 - r, 0) ** 4 * (4 * r + 1),
-}
-
 
 @dataclass(frozen=True, eq=False)
 class RadialSum:
-    """``sum_i weights_i kernel(shape |x - centres_i|)`` plus a polynomial of degree 0 or 1, if any (3.6, 3.7, 3.10).
+    """``sum_i weights_i exp(-(shape |x - centres_i|)^2)`` plus a polynomial of degree 0 or 1, if any (3.6, 3.7, 3.10).
 
     ``centres`` (m, d), ``weights`` (m,), ``polynomial`` (0,), (1,) or (d + 1,); ``shape``: one over a length; ``condition``: the
     condition number of the matrix that gave the weights.
@@ -31,30 +23,32 @@ class RadialSum:
     weights: Floats
     polynomial: Floats
     shape: float
-    kernel: str
     condition: float
 
     def __call__(self, points: Floats) -> Floats:
         """Values (n,) at ``points`` (n, d)."""
-        found = KERNELS[self.kernel](self.shape * cdist(points, self.centres)) @ self.weights
+        found = _gaussians(points, self.centres, self.shape) @ self.weights
         return np.asarray(found + _monomials(points, len(self.polynomial)) @ self.polynomial)
 
 
-def radial_sum(
-    points: Floats, values: Floats, centres: Floats, shape: float, *, kernel: str = "gaussian", terms: int = 0
-) -> RadialSum:
+def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
     """The sum with these ``centres`` (m, d) whose ``values`` (n,) at ``points`` (n, d) are nearest in the mean square; as many
     centres as points interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; no sum of weights takes its place (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
         raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
-    basis = np.hstack([KERNELS[kernel](shape * cdist(points, centres)), _monomials(points, terms)])
+    basis = np.hstack([_gaussians(points, centres, shape), _monomials(points, terms)])
     # Weights are orthogonal to the polynomials: they are sought in the null space of those.
     flat = np.linalg.qr(_monomials(centres, terms), mode="complete").Q[:, terms:]
     free = np.hstack([basis[:, : len(centres)] @ flat, basis[:, len(centres) :]])
     found, _, _, singular = np.linalg.lstsq(free, values, rcond=None)
     inner = found.shape[0] - terms
-    return RadialSum(centres, flat @ found[:inner], found[inner:], shape, kernel, float(singular[0] / singular[-1]))
+    return RadialSum(centres, flat @ found[:inner], found[inner:], shape, float(singular[0] / singular[-1]))
+
+
+def _gaussians(points: Floats, centres: Floats, shape: float) -> Floats:
+    """The basis functions of ``centres`` (m, d) at ``points`` (n, d): (n, m)."""
+    return np.asarray(np.exp(-((shape * cdist(points, centres)) ** 2)))
 
 
 def _monomials(points: Floats, terms: int) -> Floats:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, unit_normals
+from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, twins, unit_normals
 from fem_reference.geometry.distance import distances
 
 # Two triangles meet in a sharp edge where the angle between their normals is greater.
@@ -13,11 +13,7 @@ def sectors(surface: Surface) -> Ints:
     """The number (m, 3) of the sector of each corner of a triangle: around a vertex, from sharp edge to sharp edge."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # side 3 t + i leaves corner i of triangle t
-    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    which = which.ravel()
-    order = np.argsort(which, kind="stable")
-    one, other = order[count[which[order]] == 2].reshape(-1, 2).T
+    one, other = twins(triangles).T
     smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > _SHARP
     return corner_fans(one[smooth], other[smooth], triangles.size).reshape(-1, 3)
 

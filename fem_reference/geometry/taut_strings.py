@@ -13,6 +13,8 @@ Flags = NDArray[np.bool_]
 
 # Pieces of a string, its sweeps, and how far beyond the middle of its neighbours they take a point.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
+# Where a string needs more points than this, so that no piece slips past a thin tube, it is not followed further.
+MOST = 10_000
 
 
 def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Floats:
@@ -23,7 +25,7 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
     for ring in rings:  # no piece may slip past a tube
-        while np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
+        while string.shape[1] <= MOST and np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
             string = halved(string)
     for first in (1, 2) * _SWEEPS:
         inner = np.arange(first, string.shape[1] - 1, 2)
@@ -50,7 +52,7 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """The points (n, N) of strings that may touch an obstacle: nearer than a tangent is after a quarter of a piece."""
+    """Mask (n, N) of the points of strings that may touch an obstacle: nearer to it than a tangent after a quarter of a piece."""
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
     piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2

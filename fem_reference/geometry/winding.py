@@ -12,7 +12,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.obstacles import SmoothSurface, Touch
-from fem_reference.geometry.taut_strings import Flags, halved, longest, met, taut, touching
+from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, met, taut, touching
 
 # Steps of a geodesic; the error of its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
 _STEPS = 60
@@ -39,17 +39,12 @@ class Winding:
     @classmethod
     def straight(cls, count: int, starts: Floats, ends: Floats) -> "Winding":
         """The straight paths, with knots for ``count`` obstacles."""
-        knots = np.repeat(ends[:, None], 2 + count * (_STEPS + 1), axis=1)
-        knots[:, 0] = starts
         away = np.linalg.norm(ends - starts, axis=1)
-        tangents = np.repeat(
-            ((ends - starts) / np.where(away > 0, away, 1.0)[:, None])[:, None], knots.shape[1], axis=1
-        )
-        arcs = np.repeat(away[:, None], knots.shape[1], axis=1)
-        arcs[:, 0] = 0
-        return cls(
-            knots, tangents, arcs, np.zeros((len(starts), count), dtype=np.int64), np.zeros(len(starts), dtype=bool)
-        )
+        along = (ends - starts) / np.where(away > 0, away, 1.0)[:, None]
+        size = 2 + count * (_STEPS + 1)
+        knots, tangents, arcs = (np.repeat(one[:, None], size, axis=1) for one in (ends, along, away))
+        knots[:, 0], arcs[:, 0] = starts, 0.0
+        return cls(knots, tangents, arcs, np.zeros((len(starts), count), np.int64), np.zeros(len(starts), bool))
 
     def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
         """The paths ``which`` along geodesics ``same`` on the obstacles of a ``pattern``."""
@@ -153,6 +148,7 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts, self.ends, np.array(points), np.array(along), np.array(sizes))
 
 
+@np.errstate(all="ignore")  # what is not a number counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
     """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which have none of both inside."""
     string = taut(obstacles, starts, ends)
@@ -173,7 +169,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
             else:
                 found.put(pattern, which[same], pieces, same)
                 found.failed[which[same]] = ~smooth[same]
-    found.failed[:] |= _wrong(obstacles, found, string)
+    found.failed[:] |= _wrong(obstacles, found, string) | (string.shape[1] > MOST)
     return found
 
 
@@ -181,11 +177,11 @@ def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -
     """The paths (n,) that cross an obstacle or are longer than the string, but for what its chords cut off."""
     count, shares = len(string), np.linspace(0, 1, _CHECKED)
     points = found.at(np.repeat(np.arange(count), _CHECKED), np.tile(shares, count))
-    wrong = found.lengths > 1.02 * np.linalg.norm(np.diff(string, axis=1), axis=2).sum(axis=1)
+    wrong = ~(found.lengths <= 1.02 * np.linalg.norm(np.diff(string, axis=1), axis=2).sum(axis=1))
     for obstacle in obstacles:
         value, slope = obstacle.level(points)
         away = value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
-        wrong |= (away < -1e-4 * obstacle.bend).reshape(count, _CHECKED).any(axis=1)
+        wrong |= ~(away >= -1e-4 * obstacle.bend).reshape(count, _CHECKED).all(axis=1)
     return wrong
 
 
@@ -214,13 +210,14 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
     for _ in range(_ITERATIONS):
         part = pieces.rows(todo)
         kinks = part.kinks()
-        left = np.abs(kinks).max(axis=1) > near[todo]
+        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # also what is not a number
         if not left.any():
             return pieces, np.ones(len(near), dtype=bool)
         part, kinks, todo = part.rows(np.flatnonzero(left)), kinks[left], todo[left]
         count, size = kinks.shape
         every = part.rows(np.tile(np.arange(count), size)).moved(_STEP * np.repeat(np.eye(size), count, axis=0))
         slopes = (every.kinks().reshape(size, count, size) - kinks).transpose(1, 2, 0) / _STEP
+        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # which no change mends
         change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
         change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
         part = _better(part, change, np.linalg.norm(kinks, axis=1))

@@ -6,16 +6,12 @@ Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/1
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.foundations.motion import apply
-from fem_reference.geometry.obstacles import Touch
-
-Vector = tuple[float, float, float]
+from fem_reference.geometry.obstacles import Quadric, Touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +35,6 @@ class Paths:
         """False (n,): each closed form has a path."""
         return np.zeros(len(self.parts), dtype=bool)
 
-    def moved(self, pose: Floats) -> Self:
-        """The paths where a ``pose`` (4, 4) takes them."""
-        starts, ends, on, off, middles = (
-            apply(pose, points) for points in (self.starts, self.ends, *self.touches, self.middles)
-        )
-        return type(self)(self.parts, starts, ends, (on, off), middles, self.axes @ pose[:3, :3].T, self.turns)
-
     def touching(self) -> list[Touch]:
         """The one obstacle, as if met at the starts and left at the ends: what lies between pulls along the same lines."""
         first, last = self.directions()
@@ -63,7 +52,7 @@ class Paths:
         arms = (_across(touch - self.middles, self.axes) for touch in self.touches)
         along = (self.turns[:, None] * np.cross(self.axes, arm) + climb for arm in arms)
         first, last = (np.where(wraps[:, None], found, straight) for found in along)
-        return _units_or_zero(first), _units_or_zero(last)
+        return _units(first), _units(last)
 
     def at(self, which: Ints, shares: Floats) -> Floats:
         """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
@@ -83,39 +72,19 @@ class Paths:
         return np.asarray(middles + height + climb + turned)
 
 
-@dataclass(frozen=True)
-class WrappingSphere:
-    """A ball of ``radius`` about ``centre`` [mm]."""
-
-    centre: Vector
-    radius: float
-
-    def around(self, starts: Floats, ends: Floats) -> Paths:
-        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along the great circle through both, or one of them
-        where they are opposite each other; points inside count as on the surface.
-        """
-        arms = starts - self.centre
-        axes = _perpendicular(np.cross(arms, ends - self.centre), arms)
-        return _around(starts, ends, np.asarray(self.centre), axes, self.radius)
-
-
-@dataclass(frozen=True)
-class WrappingCylinder:
-    """The infinite cylinder of ``radius`` [mm] about the line through ``point`` [mm] along ``axis``, of any length."""
-
-    point: Vector
-    axis: Vector
-    radius: float
-
-    def around(self, starts: Floats, ends: Floats) -> Paths:
-        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm], along a helix; points inside count as on it."""
-        axis = self._unit()
-        one, other = (_across(points - self.point, axis) for points in (starts, ends))
-        senses = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)
-        return _around(starts, ends, np.asarray(self.point), senses[:, None] * axis, self.radius)
-
-    def _unit(self) -> Floats:
-        return np.asarray(self.axis, float) / np.linalg.norm(self.axis)
+def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both or
+    one of them where they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
+    """
+    middle = obstacle.pose[:3, 3]
+    if np.isfinite(obstacle.radii[2]):
+        arms = starts - middle
+        axes = _perpendicular(np.cross(arms, ends - middle), arms)
+    else:
+        axis = obstacle.pose[:3, 2]
+        one, other = (_across(points - middle, axis) for points in (starts, ends))
+        axes = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)[:, None] * axis
+    return _around(starts, ends, middle, axes, float(obstacle.radii[0]))
 
 
 def straight(starts: Floats, ends: Floats) -> Paths:
@@ -161,10 +130,7 @@ def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
 
 
 def _units(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
-
-
-def _units_or_zero(vectors: Floats) -> Floats:
+    """Vectors (n, 3) of length 1 along ``vectors``, 0 for 0."""
     sizes = np.linalg.norm(vectors, axis=1)[:, None]
     return np.asarray(vectors / np.where(sizes > 0, sizes, 1.0))
 

@@ -70,7 +70,7 @@ def read_polylines(path: Path, unit: float) -> Polylines:
 
 
 def read_moved_polylines(path: Path, unit: float) -> Polylines:
-    """Lines as ``read_polylines`` reads them, as a solver moved them: with points not finite and lines of no length as well."""
+    """Lines of a moved state, read as by ``read_polylines``; points that are not finite and lines without length are accepted."""
     return _polylines(path, unit, lambda lines: lines)
 
 
@@ -83,7 +83,7 @@ def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Po
 
 
 def read_points(path: Path) -> Floats:
-    """The points (n, 3) of a VTK file, whatever its cells."""
+    """The points (n, 3) of a VTK file with cells of any kind."""
     return np.asarray(_attempt(vtk.read_points, path, "a VTK file, whole"), float)
 
 
@@ -213,7 +213,7 @@ def _unwritten(path: Path, error: OSError) -> OSError:
 
 
 def clear(path: Path) -> None:
-    """Remove what processes that were killed have left of ``path``, a file or a folder."""
+    """Remove what killed processes have left of ``path``, a file or a folder."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
         process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
         with suppress(OSError):

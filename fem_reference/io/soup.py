@@ -74,6 +74,14 @@ def rows(points: Floats) -> list[str]:
     return [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist()]
 
 
+def of_meshio(points: Any, blocks: Any) -> Soup:
+    """Points and triangles from the cell ``blocks`` of meshio; points and lines are passed over."""
+    if other := {block.type for block in blocks} - {"triangle", "line", "vertex"}:
+        raise ValueError(f"cells of type {', '.join(sorted(other))}")
+    triangles = [block.data for block in blocks if block.type == "triangle"]
+    return points, np.concatenate([np.empty((0, 3), np.int64), *triangles])
+
+
 class PointLists(NamedTuple):
     """Cells as lists of points: ``sizes`` (m,), and the points of all, one after the other, in ``corners``."""
 

@@ -7,11 +7,14 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+
+import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
@@ -84,6 +87,21 @@ def finite(value: float) -> float | None:
     (2.0, None)
     """
     return float(value) if math.isfinite(value) else None
+
+
+def plain(value: Any) -> Any:
+    """``value`` as valid JSON: records as tables, arrays and tuples as lists, and a number that is not finite as None.
+
+    >>> plain({"error": float("nan"), "sizes": (2.0, 1)})
+    {'error': None, 'sizes': [2.0, 1]}
+    """
+    if is_dataclass(value):
+        value = vars(value)
+    if isinstance(value, Mapping):
+        return {key: plain(inside) for key, inside in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(inside) for inside in value]
+    return finite(value) if isinstance(value, float) else value
 
 
 def is_file(path: Path) -> bool:

@@ -16,17 +16,13 @@ _MOST = 3 * 10**7
 
 
 def read(path: Path) -> list[tuple[float, Floats, Ints]]:
-    """Time, points where they are then, and triangles of each step."""
+    """Time, positions of the points, and triangles of each step."""
     import meshio
 
     for item in parsed_xml(path).iter("DataItem"):
         _check(item, path)
     with meshio.xdmf.TimeSeriesReader(path) as series:
-        points, blocks = series.read_points_cells()
-        if other := {block.type for block in blocks} - {"triangle", "line", "vertex"}:
-            raise ValueError(f"cells of type {', '.join(sorted(other))}")
-        corners = [block.data for block in blocks if block.type == "triangle"]
-        points, triangles = soup.arrays((points, np.concatenate([np.empty((0, 3), np.int64), *corners])))
+        points, triangles = soup.arrays(soup.of_meshio(*series.read_points_cells()))
         steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
     return [(time, points + _displacement(data, points), triangles) for time, data in steps]
 

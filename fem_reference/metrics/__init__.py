@@ -36,7 +36,8 @@ class Statistic:
     ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
     ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
     position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
-    for the value of a single fibre, or of the force on a bone: nothing averages there.
+    for the value of a single fibre, or of the force on a bone: nothing averages there; ``pooled``: True where the statistics of its
+    metric are of one field in one unit, so that a difference of one that is small by chance counts as that of all.
     """
 
     unit: str
@@ -48,6 +49,7 @@ class Statistic:
     shown: Mapping[Shown, int] = field(default_factory=dict)
     local: bool = False
     lone: bool = False
+    pooled: bool = False
 
     @property
     def label(self) -> str:

@@ -42,7 +42,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def wrapped(angles: Floats) -> Floats:
-    """Differences of two angles, in (-2 pi, 2 pi), the short direction round: in (-pi, pi]. What is there already keeps its digits.
+    """Differences of two angles, in (-2 pi, 2 pi), mapped to (-pi, pi]; values already in this range do not change at all.
 
     >>> np.degrees(wrapped(np.radians([20.0, 340.0, -340.0]))).round(9).tolist()
     [20.0, -20.0, 20.0]

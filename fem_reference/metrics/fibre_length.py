@@ -1,9 +1,9 @@
 """Lengths of the fibres of a run against those of the reference, frame by frame.
 
-Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of
-both go through the measurement context's extension, so that like is compared with like. A run of lines alone (a line of action)
-puts its own points in the place of the fibres': its whole length is compared, so that it deviates at rest already where
-a straight line is shorter than the fibre. That is its error, and no change of length from its own rest makes up for it.
+Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of both
+go through the measurement context's extension, so that like is compared with like. A run of lines alone (a line of action) has its
+own points in place of the fibres'. Its whole length is compared, so it deviates at rest already where a straight line is shorter
+than the fibre. That counts as its error, even if its change of length from rest is correct.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
 
-It is computed from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
+It is computed from the surface alone, so it exists for every run; where a solver has an interior, its smallest det F tells more.
 """
 
 from functools import lru_cache

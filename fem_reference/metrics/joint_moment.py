@@ -1,8 +1,10 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
 
 A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
-space. Virtual work binds moment and energy: where nothing is dissipated, the moment is minus the slope of the stored energy in the
-angle. Lines of action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
+space. By virtual work, where nothing is dissipated, the moment is minus the slope of the stored energy in the angle. Lines of
+action pull at their ends, via-points and obstacles; without ``hill``, and of most fast solvers, no force is known.
+
+The arm is not that of the fibres' excursion: a matrix that is bent bears a moment with little force (docs/measures.md).
 """
 
 import numpy as np
@@ -30,18 +32,29 @@ STATISTICS = {
         local=True,
         lone=True,
     ),
+    "arm": Statistic(
+        "mm",
+        "Joint",
+        "arm by force",
+        curve="Moment arm by force: moment over force",
+        shown={"curve": 28, "angle": 28},
+        local=True,
+        lone=True,
+    ),
 }
 OF, AGAINST = "lines", "reference"
 _LEAST = 1e-6  # of the greatest force, below which a force is round-off and has no arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """The differences of ``moment`` [N mm] and ``force`` [N] from those of the reference; NaN where no joint turns alone."""
+    """The differences of ``moment`` [N mm], ``force`` [N] and ``arm`` [mm] from those of the reference; NaN where no joint turns
+    alone, and the arm where there is no force.
+    """
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
         return ()
-    which, found = turning(joints, context, run.numbers), np.full((2, len(run.numbers)), np.nan)
+    which, found = turning(joints, context, run.numbers), np.full((3, len(run.numbers)), np.nan)
     for i, joint in enumerate(joints):
         expected = 0.0 if reference.solver == "rest" else _values(reference, joint)
         found[:, which == i] = (_values(run, joint) - expected)[:, which == i]
@@ -51,12 +64,10 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 def force_arms(run: Run, joint: Joint) -> Floats:
     """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN where there is none.
 
-    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, virtual work
-    makes it the mean of ``-dl/dtheta`` of what pulls, each with its share of the resultant.
+    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, by virtual
+    work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
     """
-    moment, force = _values(run, joint)
-    known = force > _LEAST * force.max(initial=0.0)
-    return np.asarray(np.divide(moment, force, out=np.full(len(force), np.nan), where=known))
+    return np.asarray(_values(run, joint)[2])
 
 
 def _has_force(run: Run, joint: Joint) -> bool:
@@ -64,6 +75,8 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment and force by frame (2, f)."""
-    moment, force = run.moment(joint.bone.name, joint.centre), run.force(joint.bone.name)
-    return np.array([moment @ joint.axis, np.linalg.norm(force, axis=1)])
+    """Moment, force and arm by frame (3, f)."""
+    moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
+    force = np.linalg.norm(run.force(joint.bone.name), axis=1)
+    known = force > _LEAST * force.max(initial=0.0)
+    return np.array([moment, force, np.divide(moment, force, out=np.full(len(force), np.nan), where=known)])

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the joint that turns, by tendon excursion: ``-dl/dtheta`` (An et al. 1984).
 
 ``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive where the muscle shortens with a
-growing angle, as in OpenSim. The slope is that of the parabola through three frames, off by terms of second order in their angles.
-A frame in which the joint rests has the slope of the frames nearest in time. Where more than one bone moves, lengths do not depend
-on one angle alone, and the arm is NaN. A case without a joint has no arms.
+growing angle, as in OpenSim. The slope is that of the parabola through three frames, with an error of second order in their
+angles. A frame in which the joint rests has the slope of the frames nearest in time. Where more than one bone moves, lengths do
+not depend on one angle alone, and the arm is NaN. A case without a joint has no arms.
 """
 
 from collections.abc import Iterator, Sequence

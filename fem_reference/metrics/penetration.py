@@ -1,6 +1,6 @@
-"""Depth and volume of a run's muscle inside the bones; of the run alone, whatever the reference does.
+"""Depth and volume of a run's muscle inside the bones; of the run alone, independent of the reference.
 
-By the same distance field as contact, and where contact is exempt too: there it counts by how much deeper it is than at rest.
+The distance field is that of contact. Where contact is exempt, only the depth beyond that at rest counts.
 """
 
 import logging

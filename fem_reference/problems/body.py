@@ -37,7 +37,7 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """True of an element with displacement and pressure of one degree, whose pressure would oscillate without stabilisation.
+    """True for an element with displacement and pressure of one degree, whose pressure would oscillate without stabilisation.
 
     The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the
     mean of the second derivatives of the energy by F_ij, i != j. It falls with the square of the cell size.

@@ -10,8 +10,17 @@ from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
+from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
+from fem_reference.problems.body import (
+    Body,
+    Cells,
+    Prescribed,
+    boundary_facets,
+    check_element,
+    check_quadrature,
+    reference_nodes,
+)
 from fem_reference.problems.contact import ContactBone, ContactLaw
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
@@ -21,12 +30,13 @@ _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
+_OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fibres are checked too
 _THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
 
 
-def check(body: Body, element: str) -> None:
+def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
     """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that
-    it names exist, and its constraints can be distinguished, followed and solved.
+    it names exist, its constraints can be distinguished, followed and solved, and quadrature of that degree suits the element.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -47,6 +57,7 @@ def check(body: Body, element: str) -> None:
     _check_needs(body)
     check_agreement(body)
     _check_start(body)
+    check_quadrature(element, quadrature_degree, "quadrature_degree")
 
 
 def check_box(counts: object, size: object, kind: object, degree: object) -> None:
@@ -84,13 +95,13 @@ def check_frames(frames: object, place: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    """True of a finite number that is not a bool."""
+    """True for a finite number that is not a bool."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     return number and bool(abs(value) <= _FARTHEST)
 
 
 def _is_integer(value: Any) -> bool:
-    """True of an integer that is not a bool."""
+    """True for an integer that is not a bool."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
@@ -203,9 +214,17 @@ def _check_needs(body: Body) -> None:
         return
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
-    cells = np.arange(len(body.mesh.cells))
+    nodes = body.mesh.points[body.mesh.cells]
+    middles = nodes.mean(axis=1)
+    for places in (middles, *(middles + _OUTWARDS * (corner - middles) for corner in np.swapaxes(nodes, 0, 1))):
+        _check_unit(body.fibre, places)
+
+
+def _check_unit(fibre: Directions, places: Floats) -> None:
+    """Raise InputError unless the directions at ``places`` (n, 3) [mm], one in each cell, are unit vectors."""
+    cells = np.arange(len(places))
     try:
-        found = np.asarray(body.fibre(cells, body.mesh.points[body.mesh.cells].mean(axis=1)), float)
+        found = np.asarray(fibre(cells, places), float)
     except Exception as error:  # any error in a function of the caller
         raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
     if found.shape != (len(cells), 3):
@@ -240,11 +259,10 @@ def _check_start(body: Body) -> None:
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
-            place, got = (
-                f'prescribed "{entry.name}": path at frame {body.frames[0]:g}',
-                f"displacements up to {off:.4g} mm",
+            place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
+            raise InputError(
+                place, f"displacements up to {off:.4g} mm", "none at the first frame: the body begins at rest"
             )
-            raise InputError(place, got, "none at the first frame: the body begins at rest")
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:

@@ -13,10 +13,10 @@ from fem_reference.effects import (
     Ramped,
     State,
     elastic_state,
-    fibre_tension,
     total_energy,
 )
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
+from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.anatomy import lean
@@ -182,7 +182,8 @@ def _tension(case: MuscleCase) -> float:
     """The stress of all fibres at their rest length [MPa], the mean over the frames."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     return sum(
-        float(np.mean([one.amount(frame) for frame in case.numbers])) * fibre_tension(one, 1.0) for one in pulling
+        float(np.mean([one.amount(frame) for frame in case.numbers])) * fibre_tension(one.energy, 1.0)
+        for one in pulling
     )
 
 

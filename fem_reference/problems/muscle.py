@@ -1,9 +1,10 @@
 """Muscles filled with tetrahedra and fibres, with their effects, and as finite element bodies attached to bones."""
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -51,10 +52,9 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
-from fem_reference.problems.joints import joints_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
-from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.
@@ -62,7 +62,7 @@ RELAXING = 10
 
 
 def kept_meshes() -> Path | None:
-    """The folder that keeps tetrahedra; it may be deleted. None: they are made each time."""
+    """The folder of stored tetrahedra; it may be deleted. None: they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
@@ -76,11 +76,11 @@ class MuscleProblem(Setup):
     mesh: TetMesh
     effects: tuple[Effect, ...]
     fibres: Polylines
-    mesh_facts: dict[str, float | str]
-    seconds: float
     fibre: Directions | None = None
     skin: Skin | None = None
     attached_skins: dict[str, Skin] = field(default_factory=dict)
+    mesh_facts: dict[str, float | str] = field(default_factory=dict)
+    seconds: float = 0.0
 
     @cached_property
     def directions(self) -> Floats | None:
@@ -104,24 +104,35 @@ class MuscleProblem(Setup):
         springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where
         two bones prescribe different motions, or one moves in a way that cannot be followed.
         """
-        return _body_of(self)
+        mesh, first = self.mesh, self.frames[0]
+        check_thinness(mesh)
+        attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in self.attached)])
+        outer, _ = boundary(mesh.tets)
+        taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
+        free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
+        cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+        prescribed = []
+        for entry in self.attached:
+            name, path = entry.attachment, Follows(From(first, entry.bone.pose))
+            prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
+        acting = tuple(effect for effect in self.effects if not isinstance(effect, Interaction))
+        body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre)
+        body = replace(body, interval=self.interval, start=self.start)
+        if self.contact is not None:
+            assert self.skin is not None  # built with the effect
+            body = _among_bones(body, self.bones, self.skin, self.contact)
+        check_agreement(body)
+        return body
 
     @property
     def contact(self) -> ContactEffect | None:
         """The effect of contact, None where there is none."""
         return among(self.effects)
 
-    def load(self, frame: float) -> Floats | None:
-        """The sum (3,) [N] of the external forces at a frame; None where it depends on the deformation."""
-        cells, volume = self.body.mesh, float(tet_volumes(self.mesh.points, self.mesh.tets).sum())
-        forces = [
-            one.resultant(volume, lambda part: float(triangle_areas(cells.points, cells.facets[part]).sum()))
-            for one in self.effects
-        ]
-        known = [
-            one.amount(frame) * force for one, force in zip(self.effects, forces, strict=True) if force is not None
-        ]
-        return None if len(known) < len(forces) else np.sum(known, axis=0)
+    @property
+    def obstacles(self) -> tuple[Bone, ...]:
+        """The bones in contact with the muscle."""
+        return tuple(bone for bone in self.bones if self.contact is not None and self.contact.is_by(bone.name))
 
     def write_meshes(self, folder: Path) -> None:
         """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
@@ -153,28 +164,29 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
-    apart, asked = spacing(rest.surface), (*case.effects, *(one.effect for one in case.decisions))
-    return MuscleProblem(
-        *(rest.surface, rest.bones, rest.attached, rest.frames, rest.interval),
-        mesh=mesh,
-        effects=case.effects,
-        fibres=fibres,
-        mesh_facts=_mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known,
-        seconds=time.perf_counter() - begin,
-        fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
-        skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
-        attached_skins=spring_skins(rest, mesh, apart),
-        joints=rest.joints,
-    )
+    asked = (*case.effects, *(one.effect for one in case.decisions))
+    needed = fibre if any("fibre" in effect.needs for effect in asked) else None
+    problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
+    facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known
+    return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
 
-def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
-    """The points of springs, ``apart`` [mm] from each other, by attachment."""
-    return {
+def assembled(
+    rest: Setup, mesh: TetMesh, effects: tuple[Effect, ...], lines: tuple[Polylines, Directions | None], apart: float
+) -> MuscleProblem:
+    """The set-up ``rest`` filled with a ``mesh``, its fibres and their direction (``lines``); points of contact and of springs are
+    ``apart`` [mm] from each other.
+    """
+    springs = {
         one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
         for one in rest.attached
         if one.stiffness is not None
     }
+    skin = None if among(effects) is None else free_skin(rest.exempt, mesh, apart)
+    known: dict[str, Any] = {entry.name: getattr(rest, entry.name) for entry in fields(rest)}
+    return MuscleProblem(
+        **known, mesh=mesh, effects=effects, fibres=lines[0], fibre=lines[1], skin=skin, attached_skins=springs
+    )
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
@@ -205,16 +217,20 @@ def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
 
 
 def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
-    bone, form = case.bone[i], solid(case.bone[i])
+    bone = case.bone[i]
     motion = bone.motion.poses() if bone.motion else None
-    if form is not None:
-        surface = tessellated(form, muscle.points, join(case.place, f"bone[{i}]"))
-        return Bone(bone.name, surface, motion, solid=form)
-    assert bone.surface is not None  # a CaseBone record has a closed form or a surface with its unit
-    assert bone.unit is not None
+    if bone.surface is None or bone.unit is None:
+        return closed_form(bone, muscle, join(case.place, f"bone[{i}]"))
     surface = files.read_surface(case.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
     return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+
+
+def closed_form(bone: CaseBone, muscle: Surface, place: str) -> Bone:
+    """A ``bone`` of closed form beside a ``muscle``; its errors name ``place``."""
+    form, motion = solid(bone), bone.motion.poses() if bone.motion else None
+    assert form is not None  # a CaseBone record has a closed form or a surface with its unit
+    return Bone(bone.name, tessellated(form, muscle.points, place), motion, solid=form)
 
 
 def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tuple[AttachedVertices, ...]:
@@ -262,29 +278,6 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
         facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
         facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
     return facts
-
-
-def _body_of(problem: MuscleProblem) -> Body:
-    mesh, first = problem.mesh, problem.frames[0]
-    check_thinness(mesh)
-    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
-    outer, _ = boundary(mesh.tets)
-    taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
-    free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
-    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-    prescribed = []
-    for entry in problem.attached:
-        name, path = entry.attachment, Follows(From(first, entry.bone.pose))
-        prescribed.append(Prescribed(name, problem.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
-    acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Body(
-        cells, acting, tuple(prescribed), problem.frames, problem.fibre, interval=problem.interval, start=problem.start
-    )
-    if problem.contact is not None:
-        assert problem.skin is not None  # built with the effect
-        body = _among_bones(body, problem.bones, problem.skin, problem.contact)
-    check_agreement(body)
-    return body
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:

@@ -1,12 +1,12 @@
-"""Frame numbers at which load steps end, so that no step skips motion, whatever the frames.
+"""Frame numbers at which load steps end, so that no step skips motion, for any frames.
 
 Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight
-line between two poses loses the direction), goes farther than the body is long, apart from the motion that all share,
-or goes there and back by more than a fifteenth of that distance and a hundredth of the body's size.
+line between two poses loses the direction), moves farther than the size of the body, apart from the motion that all share,
+or moves there and back by more than a fifteenth of that distance and a hundredth of the body's size.
 
-Motions and paths of this package state the frames at which they bend and the angles by which they turn between
-(``turning``), so that this holds for all of them. Any other function of a frame number is sampled 1024 times over all
-frames, at least 16 times between two of them, and again where it moves far: faster motion is not seen.
+Motions and paths of this package state the frames at which they bend and the angles by which they turn between (``turning``), so
+that this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times
+between two of them, and again where it moves far: faster motion is not seen.
 """
 
 from collections.abc import Callable, Sequence
@@ -91,7 +91,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """The thing that does more from one of ``frames`` to the next than a step may, and these two; None where none does."""
+    """The thing that moves more from one of ``frames`` to the next than a step may, and these two frames; None without one."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):

@@ -1,8 +1,8 @@
-"""Muscles before they are meshed: the surface, the bones that it is attached to and touches, and the frames wanted."""
+"""Muscles before they are meshed: the surface, its bones, its attachments, its joints, and the requested frames."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -10,17 +10,22 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import RigidMotion, apply
+from fem_reference.foundations.records import join
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.signed_distance import cached
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import AtRest, Task
+from fem_reference.scenes.muscle import MuscleCase, Vector
 
 # Distances to a bone are computed up to here [mm] from it.
 DISTANCE_MARGIN = 12.0
+# An axis of a joint is that of its bone's rotation within this angle [rad], and passes it within this distance [mm].
+_SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
 
 
 def kept_distances() -> Path:
@@ -135,3 +140,48 @@ class Setup:
     def free(self) -> NDArray[np.bool_]:
         """Mask (n,) of the vertices of the surface that may be in contact with bones."""
         return ~self.exempt.vertices
+
+
+def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
+    """The joints of a case; where it names none, one for each bone that rotates, with the bone's name and the axis of its motion.
+
+    InputError where a bone does not rotate about the axis of its joint: its angle would not be defined.
+    """
+    if not case.joint:
+        moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)
+        return tuple(
+            _joint(bone.name, bone, one, one.axis, one.centre) for bone, one in moving if one.centre is not None
+        )
+    by_name = {bone.name: bone for bone in bones}
+    found = []
+    for i, joint in enumerate(case.joint):
+        bone, place = by_name[joint.bone], join(case.place, f"joint[{i}]")
+        if bone.motion is None or bone.motion.centre is None:
+            got = f'the bone "{bone.name}", which {"rests" if bone.motion is None else "slides"}'
+            raise InputError(join(place, "bone"), got, "a bone that rotates, so that the joint has an angle")
+        _check_axis(bone.motion, np.array(joint.axis), np.array(joint.centre), place)
+        found.append(_joint(joint.name, bone, bone.motion, joint.axis, joint.centre))
+    return tuple(found)
+
+
+def _joint(name: str, bone: Bone, motion: RigidMotion, axis: Vector, centre: Vector) -> Joint:
+    """The joint of a bone; an ``axis`` against that of its ``motion`` counts the angle the other way."""
+    unit, sign = _unit(axis), float(np.sign(np.dot(axis, motion.axis)))
+    return Joint(name, bone, unit, np.array(centre), partial(_angle, motion, sign))
+
+
+def _angle(motion: RigidMotion, sign: float, frame: float) -> float:
+    return sign * float(np.interp(frame, motion.frames, motion.amounts))
+
+
+def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -> None:
+    turns, away = _unit(motion.axis), centre - np.array(motion.centre)
+    if np.linalg.norm(np.cross(_unit(axis), turns)) > _SAME_DIRECTION:
+        want = f"that of the bone's motion, {motion.axis}, or its opposite"
+        raise InputError(join(place, "axis"), str(tuple(axis.tolist())), want)
+    if (off := float(np.linalg.norm(away - (away @ turns) * turns))) > _SAME_LINE:
+        raise InputError(join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "one on it")
+
+
+def _unit(axis: Vector | Floats) -> Floats:
+    return np.asarray(axis, float) / np.linalg.norm(axis)

@@ -37,12 +37,12 @@ def first_piola(acting: Acting, state: State, count: int) -> Floats:
 
 def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
     """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of what is ``acting`` at deformation gradients ``F`` (n, 3, 3) with
-    fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without what time makes.
+    fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without effects of time.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
         some = slice(start, start + AT_ONCE)
-        jets = variables(F[some].reshape(-1, 9).T)
+        jets = variables(F[some].reshape(-1, 9).T, curved=False)
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JET_FUNCTIONS)
         with np.errstate(all="ignore"):  # what is no number is needed
@@ -108,27 +108,20 @@ def _mean(stress: Floats, volumes: Floats) -> float:
     return float(np.sqrt(((stress**2).sum(axis=(1, 2)) * volumes).sum() / volumes.sum()))
 
 
-@dataclass(frozen=True, eq=False)
-class WatchedFrame:
-    """A frame that was solved: its ``surface`` (n, 3), and the ``stresses`` in its tetrahedra, where there are any."""
-
-    surface: Floats
-    stresses: StressSizes | None
-
-
 class Watch:
     """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
 
-    From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
-    act. While a run is made, the latter is what was ``known`` before it, or more, as it turned out; at its end, the
-    greatest there was.
+       From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
+           act. While a run is made, the latter is the ``known`` estimate or, where greater, the stress found so far; at its
+       end, the greatest found.
+    ``frames``: the surface (n, 3) of each, and the stresses in its tetrahedra, where there are any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
         self.case, self.rest, self.known, self.built = case, rest, known, built
         self.left = tuple(one.effect for one in case.decisions if not one.needed)
         self.bones = rest.bones if among(self.left) else ()
-        self.frames: dict[float, WatchedFrame] = {}
+        self.frames: dict[float, tuple[Floats, StressSizes | None]] = {}
 
     @cached_property
     def sampled(self) -> StressSamples:
@@ -145,25 +138,25 @@ class Watch:
     def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
         """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), where it has tetrahedra."""
         acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
-        self.frames[number] = WatchedFrame(surface, None if tets is None else self.sampled.sizes(tets, acting, others))
+        self.frames[number] = surface, None if tets is None else self.sampled.sizes(tets, acting, others)
         return self._found(number, max(self.known.stress_tolerance, STRESS_TOLERANCE * self._most()))
 
     def end(self) -> tuple[Decision, ...]:
         """The effects that matter, at the first of all frames at which one does, now that all stresses are known."""
-        if any(one.stresses is None for one in self.frames.values()):
+        if any(stresses is None for _, stresses in self.frames.values()):
             return ()
         tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
         return next((found for number in sorted(self.frames) if (found := self._found(number, tolerance))), ())
 
     def _most(self) -> float:
-        return float(np.max([one.stresses.acts if one.stresses else 0.0 for one in self.frames.values()]))
+        return float(np.max([stresses.acts if stresses else 0.0 for _, stresses in self.frames.values()]))
 
     def _found(self, number: float, stress_tolerance: float) -> tuple[Decision, ...]:
-        watched = self.frames[number]
-        now = self._moving(solved(self.known, self.rest, self.bones, number, watched.surface), number)
-        stretch = watched.stresses.stretch if watched.stresses else now.stretch
+        surface, stresses = self.frames[number]
+        now = self._moving(solved(self.known, self.rest, self.bones, number, surface), number)
+        stretch = stresses.stretch if stresses else now.stretch
         now = replace(now, stress_tolerance=stress_tolerance, stretch=stretch)
-        each = [self._decided(i, now, watched.stresses) for i in range(len(self.left))]
+        each = [self._decided(i, now, stresses) for i in range(len(self.left))]
         return tuple(replace(one, turned_out=number) for one in each if one.needed)
 
     def _decided(self, i: int, now: Estimates, stresses: StressSizes | None) -> Decision:
@@ -182,7 +175,7 @@ class Watch:
         if not before:
             return now
         numbers = [*before, number]
-        at = np.stack([self.frames[one].surface for one in numbers])
+        at = np.stack([self.frames[one][0] for one in numbers])
         velocities = np.diff(at, axis=0) / np.diff(numbers)[:, None, None]
         last, axis = velocities[-1], axis_of(self.rest)
         change = float(rms(last - velocities[0] if len(velocities) > 1 else last))

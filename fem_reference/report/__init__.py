@@ -13,6 +13,6 @@ __all__ = ["NAME", "Page", "of_comparison", "summary", "write"]
 
 
 def of_comparison(comparison: Comparison) -> Page:
-    """The page of a comparison, whatever was compared; its numbers are ``measures.json`` and ``measures.csv``."""
+    """The page of a comparison of any kind; its numbers are ``measures.json`` and ``measures.csv``."""
     of_field = "field" in comparison.reference.carries
     return field_page.comparison_page(comparison) if of_field else comparison_page.page(comparison)

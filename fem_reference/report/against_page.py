@@ -1,4 +1,4 @@
-"""The page of two versions of one solver: what got better, what worse, and where."""
+"""The page of two versions of one solver: statistics that became better or worse, and the places."""
 
 import math
 from functools import partial
@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.mesh import Floats
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
-from fem_reference.report.gallery import Figure, Shot, ramp, ticks
+from fem_reference.report.gallery import Shot
 from fem_reference.report.pages import Page
 from fem_reference.report.words import number, title_of
 from fem_reference.runs.store import seconds_per_frame
@@ -26,7 +26,9 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case of that ``setup``."""
     current = versions.current
-    figures, missing = _pictures(versions, setup)
+    # Of the frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing.
+    run, found = current.candidate, versions.place
+    shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
     contents = {
         "versions": versions,
         "current": current,
@@ -36,14 +38,10 @@ def page(versions: Versions, setup: Setup) -> Page:
         "curves": [_curve(one, i) for i, one in enumerate(_shown(versions))],
         "moved": _moved(versions),
         "place": place(versions),
-        "figures": figures,
-        "missing": missing,
-        "ramp": ramp(),
-        "ticks": ticks,
+        "figures": shown[0],
+        "missing": shown[1],
         "sampled": versions.before is None,
         "seconds": seconds_per_frame(current.candidate),
-        "title_of": title_of,
-        "infinite": math.inf,
         "label": partial(label, current.scene, setup),
     }
     title = f"{current.candidate.name} against what it was: {current.scene.title}"
@@ -83,7 +81,7 @@ def _unit(one: Change) -> str:
 
 
 def place(versions: Versions) -> str:
-    """The vertex that moved most, in words; empty where none did."""
+    """The vertex that moved most, in words; empty where none moved."""
     if versions.place is None:
         return ""
     i, vertex, distance = versions.place
@@ -95,21 +93,14 @@ def place(versions: Versions) -> str:
 def facts(versions: Versions) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     rows = [
-        {
-            "statistic": one.name,
-            "unit": one.unit,
-            "word": one.word,
-            "frame": one.frame,
-            "was": finite(float(one.was[one.at])),
-            "now": finite(float(one.now[one.at])),
-            "further": finite(one.by),
-            "error_bar": finite(one.bar),
-        }
+        {"statistic": one.name, "unit": one.unit, "word": one.word, "frame": one.frame}
+        | {"was": one.was[one.at], "now": one.now[one.at], "further": one.by, "error_bar": one.bar}
         for one in versions.changes
     ]
     current = versions.current
     named = {"case": current.scene.name, "candidate": current.candidate.name, "against": versions.was}
-    return named | {"counts": {one: versions.count(one) for one in ORDER}, "moved": place(versions), "changes": rows}
+    counts = {one: versions.count(one) for one in ORDER}
+    return dict(plain(named | {"counts": counts, "moved": place(versions), "changes": rows}))
 
 
 def text(versions: Versions) -> str:
@@ -150,12 +141,6 @@ def _moved(versions: Versions) -> Drawing | None:
         axes.set_ylim(bottom=0)
 
     return over_frames("moved", "Distance of vertices from where they were", "mm", draw)
-
-
-def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:
-    """The frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing."""
-    run, found = versions.current.candidate, versions.place
-    return gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:

@@ -1,4 +1,4 @@
-"""Pages that were asked for by a command: their names, which hold what makes each different, and the index of them."""
+"""Pages requested by a command: their names, which state what makes each different, and the index of pages."""
 
 import hashlib
 import re
@@ -22,8 +22,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page as it is asked for: the ``verb``, the ``base`` of its default name, what determines it, and the name in its folder,
-    empty where it has no folder of its own.
+    """A page as a command requests it: the ``verb``, the ``base`` of its default name, what determines it, and the name in its
+    folder, empty where it has no folder of its own.
     """
 
     verb: str
@@ -33,7 +33,7 @@ class Asked:
 
     @property
     def command(self) -> str:
-        """The command line that makes it, without what changes no number on it."""
+        """The command line that makes it, without options that change no number on it."""
         return shlex.join(["fem-reference", self.verb, *(word for part in self.parts for word in part.words)])
 
     @property

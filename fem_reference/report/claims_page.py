@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import described
-from fem_reference.report.drawings import PALETTE, Drawing, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 from fem_reference.report.words import words
 
@@ -48,14 +48,8 @@ def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
 def facts(claims: Claims) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     whole = Cover.of(claims.claims)
-    return {
-        "claims": whole.count,
-        "covered": finite(whole.share),
-        "median_ratio": finite(whole.median),
-        "sizes_mm": claims.sizes,
-        "missing": claims.missing,
-        "rows": [vars(one) | {"bar": finite(one.bar), "error": finite(one.error)} for one in claims.claims],
-    }
+    said = {"claims": whole.count, "covered": whole.share, "median_ratio": whole.median}
+    return dict(plain(said | {"sizes_mm": claims.sizes, "missing": claims.missing, "rows": claims.claims}))
 
 
 def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
@@ -68,14 +62,13 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
         ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
         for i, case in enumerate(dict.fromkeys(one.case for one in claims)):
             some = [one for one in shown if one.case == case]
-            colour = PALETTE[i % len(PALETTE)]
-            axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
+            errors, bars = [one.error for one in some], [one.bar for one in some]
+            axes.plot(errors, bars, ".", color=colour_of(i + 1), label=case, alpha=0.7)
         axes.plot(ends, ends, color="#555555", linewidth=1)
         axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")
         logarithmic(axes)
-        axes.set(xlim=ends, ylim=ends)
+        axes.set(xlim=ends, ylim=ends, ylabel=f"error bar, {UNITS[metric]}")
         axes.set_xlabel(f"difference from the finer solution, {UNITS[metric]}")
-        axes.set_ylabel(f"error bar, {UNITS[metric]}")
         if claims:
             axes.legend(fontsize="small")
 

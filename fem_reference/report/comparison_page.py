@@ -1,21 +1,28 @@
 """The page of a comparison."""
 
+import math
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
-from fem_reference.metrics import described, find
+from fem_reference.assessment.error_bars import ErrorBar
+from fem_reference.foundations.limits import ENERGY_GAP
+from fem_reference.foundations.mesh import Floats
+from fem_reference.metrics import Measure, described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.drawings import colour_of
-from fem_reference.report.pages import Headlines, Page, template
-from fem_reference.report.sections import facts_of, sections
-from fem_reference.report.sections.origin import changes
-from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, known, summary
+from fem_reference.report.drawings import look_of
+from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.sections import cost, origin
+from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, spread, summary
 from fem_reference.report.viewer import view
-from fem_reference.report.words import listed, number, ratio
+from fem_reference.report.words import listed, number
 from fem_reference.runs.store import Run, seconds_per_frame
 
 
@@ -23,22 +30,10 @@ def page(comparison: Comparison) -> Page:
     """The page of a comparison; of a reference that failed, over the frames that it reached."""
     numbers, failed = summary(comparison), _failed(comparison)
     nothing, comparison = not len(reached_frames(comparison.reference)), reached(comparison)
-    shared, said = _shared(comparison), headlines(comparison)
-    shown = [
-        template(f"sections/{name}.html").render(shared | facts_of(name, comparison))
-        for name, section in sections().items()
-        if section.has_numbers(comparison) and not (nothing and section.of_reference)
-    ]
-    contents = shared | {
-        "sentence": _sentence(comparison),
-        "headlines": said,
-        "failed": failed,
-        "key": _key(comparison),
-        "sections": shown,
-        "nothing": nothing,
-    }
-    name, rows = "comparison_page.html", as_csv(numbers["measures"])
-    return Page("comparison", comparison.scene.title, said, name, contents, numbers, rows, MEASURES)
+    said, rows = headlines(comparison), as_csv(numbers["measures"])
+    contents = _contents(comparison) | {"headlines": said, "failed": failed, "nothing": nothing}
+    title, name = comparison.scene.title, "comparison_page.html"
+    return Page("comparison", title, said, name, contents, numbers, rows, MEASURES)
 
 
 def _failed(comparison: Comparison) -> str:
@@ -56,18 +51,12 @@ def _failed(comparison: Comparison) -> str:
     return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
 
 
-def _key(comparison: Comparison) -> dict[str, Any]:
-    """The key to the page: colours of the curves, and the frames at both ends."""
-    names = [run.name for run in comparison.runs]
-    numbers = comparison.reference.numbers
-    ends = [label(comparison.scene, comparison.setup, number) for number in (numbers[0], numbers[-1])]
-    return {"colours": list(zip(names, map(colour_of, range(len(names))), strict=True)), "ends": ends}
-
-
-def _shared(comparison: Comparison) -> dict[str, Any]:
-    """The contents that all templates of the page share."""
+def _contents(comparison: Comparison) -> dict[str, Any]:
+    """The contents of the page and of its sections."""
     error = comparison.extension_error
     return {
+        "sentence": _sentence(comparison),
+        "looks": [(run.name, look_of(i)) for i, run in enumerate(comparison.runs)],
         "comparison": comparison,
         "scene": comparison.scene,
         "reference": comparison.reference,
@@ -76,24 +65,49 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
         "curves": curves,
         "bars": known(comparison),
+        "spread": spread(comparison),
         "error": error and error.worst,
         "viewer": view(comparison),
-        "colours": gallery.ramp(),
-        "ticks": gallery.ticks,
         "pictures": gallery.of_comparison,
-        "find": find,
-        "ratio": ratio,
         "label_of": label_of,
         "label": partial(label, comparison.scene, comparison.setup),
         "frame_columns": columns(comparison.scene, comparison.setup),
-        "changes": changes(comparison.scene),
+        "changes": origin.changes(comparison.scene),
         "seconds_per_frame": seconds_per_frame,
+        "inversion": inversion,
+        "greatest": greatest,
+        "widest": widest,
+        "gap": gap,
+        "energy_gap_limit": ENERGY_GAP,
+        "second_check": second_check.texts_of,
+        **cost.facts(comparison),
+        **origin.facts(comparison),
     }
+
+
+def widest(bar: ErrorBar, measure: Measure | None) -> int:
+    """The index of the widest of a ``bar`` among the frames in which the reference's ``measure`` has a value, such as a moment arm
+    where there is a force; an unknown bar there counts as the greatest.
+    """
+    if measure is None or not np.isfinite(measure.values).any():
+        return bar.widest
+    return replace(bar, values=np.where(np.isfinite(measure.values), bar.values, -1.0)).widest
+
+
+def greatest(values: Floats) -> float:
+    """The greatest of the ``values`` (f,) that are numbers, NaN where none is finite."""
+    return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
+
+
+def gap(run: Run) -> float:
+    """The energy gap that is farthest from 0 [%], NaN if there is none."""
+    values = run.scalars["energy_gap"]
+    return 100 * float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else math.nan
 
 
 def headlines(comparison: Comparison) -> Headlines:
     """The verdict on each candidate, "not judged" where nothing is expected of it, with its greatest deviations; then the
-    reference's own checks, and what makes it doubtful.
+    reference's own checks and doubts.
     """
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:

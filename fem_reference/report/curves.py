@@ -9,12 +9,19 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, described, find
 from fem_reference.metrics.moment_arm import turning
-from fem_reference.problems.setup import Joint
-from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, colour_of, over_frames, plain_numbers
+from fem_reference.report.drawings import (
+    BAND,
+    NOT_A_NUMBER,
+    REFERENCE,
+    Drawing,
+    colour_of,
+    look_of,
+    over_frames,
+    plain_numbers,
+)
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
@@ -32,10 +39,10 @@ _STATISTICS = (
 def curves(comparison: Comparison) -> list[Drawing]:
     """Every drawing for which the comparison has numbers."""
     found = [_surface(comparison, i) for i in range(len(comparison.candidates))]
-    found += [_of_runs(comparison, *key, one.curve) for key, one in described("curve").items()]
+    found += [_of_runs(comparison, key, one.curve) for key, one in described("curve").items()]
     context = comparison.context
-    for i, joint in enumerate(context.joints if isinstance(context, MeasurementContext) else ()):
-        found += [_over_angle(comparison, i, joint, key, one.curve) for key, one in described("angle").items()]
+    for i in range(len(context.joints) if isinstance(context, MeasurementContext) else 0):
+        found += [_of_runs(comparison, key, one.curve, i) for key, one in described("angle").items()]
     return [drawing for drawing in [*found, _inversion(comparison)] if drawing is not None]
 
 
@@ -44,23 +51,20 @@ def label_of(inverted: Measure) -> str:
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
-def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) -> Drawing | None:
-    """A measure of every run from rest, with the error bar of the reference; None where no run has it."""
-    found, frames = _found(comparison, metric, statistic), np.asarray(comparison.reference.numbers, float)
-    draw = partial(_draw_runs, comparison, found, frames, np.ones(len(frames), bool))
-    return over_frames(f"{metric}-{statistic}", title, next(iter(found.values())).unit, draw) if found else None
-
-
-def _over_angle(comparison: Comparison, i: int, joint: Joint, key: tuple[str, str], title: str) -> Drawing | None:
-    """The same over the angle of the joint of index ``i``, where it turns alone; None where nothing is known there."""
-    context, numbers = comparison.context, comparison.reference.numbers
-    assert isinstance(context, MeasurementContext)  # the caller asked
-    shown, found = turning(context.joints, context, numbers) == i, _found(comparison, *key)
-    if not any(np.isfinite(one.values[shown]).any() for one in found.values()):
-        return None
-    draw = partial(_draw_runs, comparison, found, np.degrees(joint.angles(numbers)), shown)
-    name, over = f"{'-'.join(key)}-{i}", f"angle of {joint.name} [°]"
-    return over_frames(name, f"{title}, over the angle", next(iter(found.values())).unit, draw, over)
+def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
+    """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of the joint of index
+    ``i``, where it turns alone. None where nothing is known there.
+    """
+    context, numbers, found = comparison.context, comparison.reference.numbers, _found(comparison, *key)
+    name, over, along, shown = "-".join(key), "frame", np.asarray(numbers, float), np.ones(len(numbers), bool)
+    if i is not None:
+        assert isinstance(context, MeasurementContext)  # which has the joints
+        joint, shown = context.joints[i], turning(context.joints, context, numbers) == i
+        name, over, along = f"{name}-{i}", f"angle of {joint.name} [°]", np.degrees(joint.angles(numbers))
+        title = f"{title}, over the angle"
+        found = found if any(np.isfinite(one.values[shown]).any() for one in found.values()) else {}
+    draw = partial(_draw_runs, comparison, found, along, shown)
+    return over_frames(name, title, next(iter(found.values())).unit, draw, over) if found else None
 
 
 def _found(comparison: Comparison, metric: str, statistic: str) -> dict[str, Measure]:
@@ -76,15 +80,15 @@ def _draw_runs(
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
             continue
-        one, colour = found[run.name], colour_of(i)
-        if i == 0 and (bar := _bar(comparison, "change", one)) is not None:
-            _band(axes, along[shown], one.values[shown], bar[shown])
+        one, look = found[run.name], look_of(i)
+        if i == 0 and one.error_bars is not None:
+            _band(axes, along[shown], one.values[shown], one.error_bars[shown])
         kept = replace(one, values=one.values[shown])
-        _line(axes, along[shown], kept, run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
+        _line(axes, along[shown], kept, run.name, linewidth=2.4 if i == 0 else 1.5, **look)
         for end in ("least", "greatest") if one.statistic == "mean" and i == 0 else ():
             if other := find(comparison.changes[run.name], one.metric, end):
                 label = "_" if _RANGE in axes.get_legend_handles_labels()[1] else _RANGE
-                axes.plot(along[shown], other.values[shown], ":", color=colour, linewidth=0.8, label=label)
+                axes.plot(along[shown], other.values[shown], ":", color=REFERENCE, linewidth=0.8, label=label)
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
@@ -110,8 +114,7 @@ def _surface(comparison: Comparison, i: int) -> Drawing | None:
     def draw(axes: Axes) -> None:
         for measure, label, style in found:
             if measure is not None:
-                bar = _bar(comparison, "deviation", measure)
-                if bar is not None:
+                if (bar := measure.error_bars) is not None:
                     _band(axes, run.numbers, np.zeros(len(bar)), bar)
                     axes.plot(run.numbers, bar, color="#888888", linewidth=1.0, linestyle=style)
                 _line(axes, run.numbers, measure, label, color=colour_of(i + 1), linestyle=style)
@@ -135,13 +138,6 @@ def _inversion(comparison: Comparison) -> Drawing | None:
 
     title = "Smallest det F of the reference (inside out below 0)"
     return over_frames("inversion", title, "", draw) if measures else None
-
-
-def _bar(comparison: Comparison, of: Of, measure: Measure) -> Floats | None:
-    """The error bars (f,) of the reference, None where they are not stated."""
-    bars = comparison.error_bars
-    bar = bars and bars.find(of, measure.metric, measure.statistic)
-    return bar.values if bar else None
 
 
 def _band(axes: Axes, along: Sequence[float] | Floats, middle: Floats, bar: Floats) -> None:

@@ -1,4 +1,4 @@
-"""Drawings that stand inside a page: SVG whose text stays text and whose ids no two drawings share, and pictures as WebP."""
+"""Drawings inside a page: SVG whose text stays text and whose ids are unique, and pictures as WebP."""
 
 import base64
 import io
@@ -12,16 +12,20 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from PIL import Image
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
+# resemble none of these.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933", "#332288", "#777777")
+# Lines of so many runs are told apart by colour alone; the next ones are broken.
+_BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
 LOOK: Any = {
@@ -65,12 +69,25 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The colour of the i-th run, the reference first.
+    """The colour of the i-th run, the reference first: the palette, then its colours ever darker.
 
-    >>> colour_of(0), colour_of(1)
-    ('#222222', '#0072b2')
+    >>> colour_of(0), colour_of(1), colour_of(11)
+    ('#222222', '#0072b2', '#004c77')
     """
-    return REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+    if i == 0:
+        return REFERENCE
+    darker, k = divmod(i - 1, len(PALETTE))
+    red, green, blue = (share * (2 / 3) ** darker for share in to_rgb(PALETTE[k]))
+    return to_hex((red, green, blue))
+
+
+def look_of(i: int) -> dict[str, Any]:
+    """The colour and the dashes of the line of the i-th run, the reference first.
+
+    >>> look_of(1), look_of(7)
+    ({'color': '#0072b2', 'linestyle': '-'}, {'color': '#882255', 'linestyle': '--'})
+    """
+    return {"color": colour_of(i), "linestyle": _DASHES[max(i - 1, 0) // _BY_COLOUR % len(_DASHES)]}
 
 
 def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:
@@ -85,7 +102,7 @@ def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figu
 
 
 def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], over: str = "frame") -> Drawing:
-    """A drawing of curves over frame numbers, or what else is named by ``over``, with a legend above."""
+    """A drawing of curves over frame numbers, or over the quantity that ``over`` names, with a legend above."""
 
     def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
@@ -108,7 +125,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
 
 
 def logarithmic(axes: Axes) -> None:
-    """Both axes in powers of ten, their numbers as people read them and not as formulas."""
+    """Make both axes logarithmic, with plain numbers instead of formulas."""
     axes.set(xscale="log", yscale="log")
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
@@ -121,9 +138,14 @@ def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
 
 
 def plain_numbers(axis: Any) -> None:
-    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones not at all."""
+    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones only where hardly a major one is seen."""
+
+    def minor(value: float, _: int | None) -> str:
+        low, high = axis.get_view_interval()
+        return number(value) if sum(low <= one <= high for one in axis.get_majorticklocs()) < 2 else ""
+
     axis.set_major_formatter(lambda value, _: number(value))
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_formatter(FuncFormatter(minor))
 
 
 def inline(svg: str, name: str, title: str) -> str:
@@ -151,12 +173,12 @@ def _named(colour: str) -> str:
 
 
 def webp(picture: Image.Image, quality: int) -> str:
-    """A picture as what stands in ``src``, compressed with ``quality`` of at most 100."""
+    """A picture as the text of ``src``, compressed with a ``quality`` of at most 100."""
     stored = io.BytesIO()
     picture.save(stored, "WEBP", quality=quality, method=4)
     return picture_source(stored.getvalue())
 
 
 def picture_source(stored: bytes) -> str:
-    """A stored WebP picture as what stands in ``src``."""
+    """A stored WebP picture as the text of ``src``."""
     return f"data:image/webp;base64,{base64.b64encode(stored).decode()}"

@@ -1,4 +1,4 @@
-"""The page of omissions: what each effect of a scene and each feature of a candidate changes, and what it costs."""
+"""The page of omissions: the change and the cost of each effect of a scene and each feature of a candidate."""
 
 import math
 from typing import Any
@@ -124,8 +124,7 @@ def drawing(found: CaseOmissions) -> Drawing | None:
         axes.axvline(0, color="#888888", linewidth=0.8)
         if bar > 0:
             axes.axhspan(floor / 2, bar, color=BAND, linewidth=0, label="error bar of the reference")
-        axes.set_xlabel("time saved, % of the whole run")
-        axes.set_ylabel("change of the surface, rms, mm")
+        axes.set(xlabel="time saved, % of the whole run", ylabel="change of the surface, rms, mm")
         figure.legend(loc="outside lower center", ncols=4, fontsize="small")
 
     return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)

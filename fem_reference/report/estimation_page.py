@@ -1,7 +1,6 @@
 """The page ``estimation``: curves, radial basis functions and implicit surfaces of the report's chapter 3 and section 7.1."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,9 @@ from fem_reference.assessment.estimation import Estimation
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
-from fem_reference.io.texts import finite
+from fem_reference.io.texts import plain
 from fem_reference.metrics import Statistic, described
-from fem_reference.report.drawings import PALETTE, Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
 # Control points in the plane, as in the report's Figure 3.1.
@@ -32,7 +31,12 @@ def page(found: Estimation) -> Page:
         "fibres": _rows(found.curves, "case", "known"),
         "areas": _rows(found.heights, "case", "attachment", "centres"),
         "choices": dict.fromkeys(one.choice for one in found.heights),
-        "drawings": [_figure(), _curves(found), _blobs(), _fits(found)],
+        "drawings": [
+            _figure(),
+            *([_curves(found)] if found.curves else []),
+            _blobs(),
+            *([_fits(found)] if found.fits else []),
+        ],
     }
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
@@ -46,32 +50,28 @@ def _columns(found: Estimation) -> dict[str, Statistic]:
 
 
 def said(found: Estimation) -> str:
-    """The best technique for fibres, and what Gaussians give."""
-    by_technique = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
-    best = min(by_technique, key=lambda name: float(by_technique[name]))
-    most = max(one.gaussians for one in found.fits)
-    fits = [one for one in found.fits if one.gaussians == most]
-    return (
-        f"of curves through a few points of a fibre {best} deviates least; {most} Gaussians miss a muscle's surface by "
-        f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
-        f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
-    )
+    """The best technique for fibres, and the accuracy of Gaussians, where they were measured."""
+    sentences = list[str]()
+    if found.curves:  # not where all fibres have few points
+        by_technique = {
+            name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES
+        }
+        best = min(by_technique, key=lambda name: float(by_technique[name]))
+        sentences.append(f"of curves through a few points of a fibre {best} deviates least")
+    most = max((one.gaussians for one in found.fits), default=0)
+    if fits := [one for one in found.fits if one.gaussians == most]:
+        sentences.append(
+            f"{most} Gaussians miss a muscle's surface by "
+            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+        )
+    return "; ".join(sentences) or "nothing was measured"
 
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    names = ("curves", "heights", "fits", "decompositions", "answers")
-    rows = {name: [asdict(one) for one in getattr(found, name)] for name in names}
-    for one in rows["heights"]:
-        one["condition"] = finite(one["condition"])
-    for one in rows["answers"]:
-        one |= {key: {name: finite(value) for name, value in one[key].items()} for key in ("changes", "bars")}
-    return {**rows, "missing": found.missing}
-
-
-def _style(i: int) -> dict[str, Any]:
-    """The look of the i-th technique."""
-    return {"color": colour_of(i + 1), "linestyle": "-" if i < len(PALETTE) - 1 else "--"}
+    names = ("curves", "heights", "fits", "decompositions", "answers", "missing")
+    return {name: plain(getattr(found, name)) for name in names}
 
 
 def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:
@@ -88,10 +88,9 @@ def _figure() -> Drawing:
     def draw(_: Figure, axes: Axes) -> None:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
             line = make(_POINTS)(np.linspace(0, 1, 400))
-            axes.plot(*line.T, linewidth=1.4, **_style(i), label=name)
+            axes.plot(*line.T, linewidth=1.4, **look_of(i + 1), label=name)
         axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
-        axes.set_xlabel("x")
-        axes.set_ylabel("y")
+        axes.set(xlabel="x", ylabel="y")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-curves", "Curves through the same five points (Figure 3.1)", (4.6, 4.0), draw)
@@ -106,11 +105,10 @@ def _curves(found: Estimation) -> Drawing:
             means = [
                 np.mean([one.rms for one in found.curves if (one.technique, one.known) == (name, n)]) for n in counts
             ]
-            axes.plot(counts, means, marker="o", markersize=3, **_style(i), label=name)
+            axes.plot(counts, means, marker="o", markersize=3, **look_of(i + 1), label=name)
         logarithmic(axes)
         axes.set_xticks(counts)
-        axes.set_xlabel("known points of a fibre")
-        axes.set_ylabel("rms deviation of the others, mm")
+        axes.set(xlabel="known points of a fibre", ylabel="rms deviation of the others, mm")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-fibres", "Fibres: error against known points", (4.6, 4.0), draw)
@@ -134,9 +132,7 @@ def _blobs() -> Drawing:
         for i, apart in enumerate(_APART):
             axes.contour(*two_blobs(apart), levels=[0.0], colors=[colour_of(i + 1)])
             axes.plot([], [], color=colour_of(i + 1), label=f"{apart:g} radii apart")
-        axes.set_aspect("equal")
-        axes.set_xlabel("radii")
-        axes.set_ylabel("radii")
+        axes.set(aspect="equal", xlabel="radii", ylabel="radii")
         axes.legend(fontsize="x-small", loc="lower center", ncols=2)
 
     return drawn("estimation-blobs", "Two Gaussians, one surface or two (Figure 7.1)", (4.6, 4.0), draw)
@@ -147,14 +143,11 @@ def _fits(found: Estimation) -> Drawing:
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, case in enumerate(dict.fromkeys(one.case for one in found.fits)):
-            some = [one for one in found.fits if one.case == case]
-            axes.plot(
-                [one.gaussians for one in some], [one.rms for one in some], "o-", color=colour_of(i + 1), label=case
-            )
+            counts, errors = zip(*((one.gaussians, one.rms) for one in found.fits if one.case == case), strict=True)
+            axes.plot(counts, errors, "o-", color=colour_of(i + 1), label=case)
         logarithmic(axes)
         axes.set_xticks(sorted({one.gaussians for one in found.fits}))
-        axes.set_xlabel("Gaussians")
-        axes.set_ylabel("rms deviation of the surface, mm")
+        axes.set(xlabel="Gaussians", ylabel="rms deviation of the surface, mm")
         axes.legend(fontsize="x-small")
 
     return drawn("estimation-surfaces", "Muscles: error against Gaussians", (4.6, 4.0), draw)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
@@ -19,7 +20,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
-from fem_reference.report.drawings import LOOK, PALETTE, REFERENCE, Drawing, drawn, positive, webp
+from fem_reference.report.drawings import LOOK, Drawing, colour_of, drawn, positive, webp
 from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
@@ -50,9 +51,8 @@ def convergence(example: Comparison) -> Drawing:
 
     def draw(axes: Axes) -> None:
         for i, (element, cells, errors) in enumerate(lines):
-            axes.loglog(cells, errors, "o-", color=PALETTE[i % len(PALETTE)], label=element)
-        axes.set_xlabel("cells")
-        axes.set_ylabel("error")
+            axes.loglog(cells, errors, "o-", color=colour_of(i + 1), label=element)
+        axes.set(xlabel="cells", ylabel="error")
 
     return _svg(f"{example.scene.name}-convergence", title, draw)
 
@@ -91,8 +91,7 @@ def _distances(example: Comparison, known: list[Run]) -> Drawing:
         for run, values in zip(runs, apart, strict=True):
             look = _look(known.index(run), run) | {"linewidth": 0.8, "markersize": 3}
             axes.plot(*_sorted(run, np.where(values > 0, values, np.nan)), label=run.name, **look)
-        axes.set_yscale("log")
-        axes.set_xlabel("x")
+        axes.set(yscale="log", xlabel="x")
 
     return _svg(f"{example.scene.name}-distance", title, draw)
 
@@ -107,8 +106,9 @@ def _look(i: int, run: Run) -> dict[str, Any]:
     """The listing as its own ``plot`` command draws it, the others by their place."""
     if run.solver == "listing":
         return dict(_LISTING)
-    colour = REFERENCE if i == 0 else PALETTE[i % len(PALETTE)]
-    return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": _MARKERS[i % len(_MARKERS)], "markersize": 3}
+    marker = _MARKERS[i % len(_MARKERS)]
+    colour = colour_of(i + 1 if i else 0)  # the first of the palette is like that of the listing
+    return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": marker, "markersize": 3}
 
 
 def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
@@ -119,28 +119,21 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
     return drawn(name, title, (5.4, 3.6), whole)
 
 
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """Values (n,) at the vertices, the ``colours`` they are drawn in, and all values (k, n) that share their scale."""
-
-    values: Floats
-    colours: str
-    scale_of: Floats
-
-
-def _panels(example: Comparison, draw: Callable[[Figure, Comparison, _Shown], None]) -> Iterator[Drawing]:
-    """The rival, the reference and their difference, each drawn by ``draw``."""
+def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
+    """The rival, the reference and their difference, each drawn by ``draw`` from values (n,) at the vertices, all values (k, n)
+    that share their scale, and the name of its colours.
+    """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
     both = np.stack([values for values in solutions if np.isfinite(values).all()] or solutions)
-    wanted = [(_called(reference), _Shown(reference.vertex_values[-1], VALUES, both))]
+    wanted = [(_called(reference), reference.vertex_values[-1], both, VALUES)]
     if other is not None:
-        wanted.insert(0, (_called(other), _Shown(other.vertex_values[-1], VALUES, both)))
+        wanted.insert(0, (_called(other), other.vertex_values[-1], both, VALUES))
         apart = other.vertex_values[-1] - reference.vertex_values[-1]
-        wanted.append((f"Difference: {other.name} minus reference", _Shown(apart, DIFFERENCES, apart[None])))
-    for title, shown in wanted:
-        if np.isfinite(shown.values).all():
-            yield _webp(title, lambda figure, it=shown: draw(figure, example, it))  # type: ignore[misc]
+        wanted.append((f"Difference: {other.name} minus reference", apart, apart[None], DIFFERENCES))
+    for title, values, scale_of, colours in wanted:
+        if np.isfinite(values).all():
+            yield _webp(title, partial(draw, example=example, values=values, scale_of=scale_of, colours=colours))
         else:
             yield Drawing(title, missing="its values are not a number, so that there is nothing to draw")
 
@@ -161,17 +154,14 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
     return Drawing(title, f'<img src="{webp(picture, 86)}" width="{width}" height="{height}" alt="">')
 
 
-def _plate(figure: Figure, example: Comparison, wanted: _Shown) -> None:
+def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
     """A map with the triangles on it, and the values as heights above the plate."""
-    mesh, values, colours = example.setup.mesh, wanted.values, wanted.colours
-    scale = _scale(wanted.scale_of, colours)
+    mesh, scale = example.setup.mesh, _scale(scale_of, colours)
     x, y = mesh.points.T
     axes: Any = figure.add_subplot(1, 2, 1)
     shown = axes.tripcolor(x, y, mesh.cells, values, shading="gouraud", cmap=colours, norm=scale)
     axes.triplot(x, y, mesh.cells, color="black", linewidth=0.3, alpha=0.35)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x")
-    axes.set_ylabel("y")
+    axes.set(aspect="equal", xlabel="x", ylabel="y")
     figure.colorbar(shown, ax=axes, shrink=0.8)
     view: Any = figure.add_subplot(1, 2, 2, projection="3d")
     surface = view.plot_trisurf(x, y, values, triangles=mesh.cells, cmap=colours, norm=scale, linewidth=0.15)
@@ -224,7 +214,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
     return windows
 
 
-def _body(figure: Figure, example: Comparison, wanted: _Shown) -> None:
+def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
     """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
@@ -238,8 +228,8 @@ def _body(figure: Figure, example: Comparison, wanted: _Shown) -> None:
     for window, place in zip(windows, grid, strict=True):
         axes = figure.add_subplot(place)
         inside = ((turned.points >= window.low) & (turned.points <= window.high)).all(axis=1)
-        scale = ScalarMappable(_scale(wanted.scale_of[:, inside], wanted.colours), wanted.colours)
-        axes.add_collection(_front(turned, wanted.values, scale, window.line))
+        scale = ScalarMappable(_scale(scale_of[:, inside], colours), colours)
+        axes.add_collection(_front(turned, values, scale, window.line))
         (x, y, _), (width, height) = (window.low + window.high) / 2, window.half
         axes.set(xlim=(x - width, x + width), ylim=(y - height, y + height), aspect="equal")
         axes.set_axis_off()

@@ -8,7 +8,6 @@ import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.judge import overall
-from fem_reference.foundations.records import Record, parse
 from fem_reference.report import field_figures
 from fem_reference.report.pages import Page
 from fem_reference.report.tables import MEASURES, as_csv, summary
@@ -18,28 +17,13 @@ from fem_reference.runs.store import Run
 AGREE = 1e-9  # of the greatest value: what only rounding differs by
 
 
-class Difference(Record):
-    """A place in a ``section`` where the report's ``text`` and its ``listing`` part, and what was ``measured`` of it."""
-
-    section: str
-    text: str
-    listing: str
-    measured: str
-
-
-class Caption(Record):
-    """The ``caption`` of a ``figure`` of the report that shows a ``case``: its pictures are not distributed with it."""
-
-    case: str
-    figure: str
-    caption: str
-
-
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
     """The page of scalar examples with the table of differences between the report's text and listings."""
     words = [one.word for one in examples]
     said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
-    return Page("examples", title, said, "field_page.html", _contents(examples) | {"differences": read_differences()})
+    return Page(
+        "examples", title, said, "field_page.html", _contents(examples) | {"differences": _section()["difference"]}
+    )
 
 
 def comparison_page(example: Comparison) -> Page:
@@ -55,32 +39,27 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
         "examples": examples,
         "word": overall(example.word for example in examples),
         "differences": (),
-        "figures_of_report": _read("figure", Caption),
+        "figures_of_report": _section()["figure"],
         "apart": apart,
         "bounds": bounds,
         "seconds": seconds,
         "pivot": pivot,
         "form": form,
-        "zip": zip,
         "drawings": field_figures.drawings,
         "convergence": field_figures.convergence,
     }
 
 
-def read_differences() -> tuple[Difference, ...]:
-    """The differences between the report's text and its listings, in the order of section 4.6."""
-    return _read("difference", Difference)
-
-
-def _read[R: Record](table: str, record: type[R]) -> tuple[R, ...]:
-    """The rows of a ``table`` of the file about section 4.6."""
-    path = Path(__file__).with_name("octave_section.toml")
-    rows = tomllib.loads(path.read_text(encoding="utf-8"))[table]
-    return tuple(parse(record, row, f"{path}: {table}[{i}]") for i, row in enumerate(rows))
+def _section() -> dict[str, list[dict[str, str]]]:
+    """The tables of the file about section 4.6 of the report: each ``difference`` between a ``text`` and its ``listing``, by
+    ``section``, with what was ``measured`` of it; and the ``caption`` of each ``figure`` of a ``case``, as its pictures are not
+    distributed.
+    """
+    return tomllib.loads(Path(__file__).with_name("octave_section.toml").read_text(encoding="utf-8"))
 
 
 def apart(example: Comparison) -> str:
-    """In one sentence, how far the listing (else the first candidate) and the equation part at the vertices."""
+    """The difference at the vertices between the listing (else the first candidate) and the equation, in one sentence."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
         return "there is a reference alone, and nothing beside it."
@@ -124,12 +103,12 @@ def seconds(run: Run) -> float | None:
 
 
 def form(example: Comparison, run: Run) -> str:
-    """The weak form that was solved: what the run says, else that of the problem."""
+    """The weak form that was solved: that of the run, else that of the problem."""
     return str(run.origin.get("form", example.setup.form))
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """The values of every run by metric, None where there is none of that run; nothing where the reference failed."""
+    """The values of every run by metric, None where a run has none; empty where the reference failed."""
     if _lost(example.reference):
         return {}
     measured = {"reference": example.changes["reference"]} | example.deviations

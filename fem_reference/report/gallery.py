@@ -2,10 +2,11 @@
 
 import logging
 import math
+import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ _TIES = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A run at a frame ``number``: ``points`` (n, 3) [mm].
+    """A run at a frame ``number``: ``points`` (n, 3) [mm], and two pictures of it, ``sources``, once they are drawn.
 
     A candidate also has the ``distances`` (n,) [mm] of its vertices to the same vertices of the reference, whose points
     are the ``outline`` (n, 3).
@@ -45,16 +46,7 @@ class Shot:
     points: Floats
     distances: Floats | None = None
     outline: Floats | None = None
-
-
-@dataclass(frozen=True)
-class Figure:
-    """Two pictures of a run at a frame ``number``, ``top`` the greatest distance [mm] on its colour bar or None."""
-
-    name: str
-    number: int
-    sources: tuple[str, str]
-    top: float | None
+    sources: tuple[str, ...] = ()
 
 
 def shots(comparison: Comparison) -> list[Shot]:
@@ -67,30 +59,27 @@ def shots(comparison: Comparison) -> list[Shot]:
     return chosen + [shot for run in comparison.candidates for shot in _worst(comparison, run)]
 
 
-def of_comparison(comparison: Comparison) -> tuple[list[Figure], str]:
+def of_comparison(comparison: Comparison) -> tuple[list[Shot], str]:
     """The figures of the runs of a comparison, each at its worst frame, or none and what is missing."""
     return figures(comparison.setup, comparison.reference.surface, shots(comparison))
 
 
-def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Figure], str]:
-    """The figures of ``wanted``, or none and what is missing."""
+def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Shot], str]:
+    """The figures of ``wanted``, or none and the missing software."""
     try:
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:
         return [], str(error)
-    end = top(wanted)
-    sources = [(picture_source(first), picture_source(second)) for first, second in drawn]
     return [
-        Figure(shot.name, shot.number, pair, None if shot.distances is None else end)
-        for shot, pair in zip(wanted, sources, strict=True)
+        replace(shot, sources=tuple(map(picture_source, pair))) for shot, pair in zip(wanted, drawn, strict=True)
     ], ""
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
     """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
     with scratch_folder() as folder:
-        job = folder / "job.npz"
-        np.savez(job, top=top(wanted), **_job(setup, surface, wanted))
+        job = folder / "job.pickle"
+        job.write_bytes(pickle.dumps(_job(setup, surface, wanted)))
         _run(program(job, folder))
         names = [[folder / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
         if not all(path.is_file() for pair in names for path in pair):
@@ -162,20 +151,19 @@ def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
 
 
 def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
-    """The arrays of a job, as ``pictures`` names them."""
-    job: dict[str, Any] = {
+    """The contents of a job, as ``pictures`` names them."""
+    shots = [
+        {"points": shot.points, "distances": shot.distances, "outline": shot.outline}
+        | {"poses": [bone.pose(shot.number) for bone in setup.bones]}
+        for shot in wanted
+    ]
+    return {
+        "top": top(wanted),
         "triangles": surface.triangles,
         "directions": directions(setup.surface, setup.bones),
-        "bones": len(setup.bones),
-        "shots": len(wanted),
+        "bones": [(bone.surface.points, bone.surface.triangles) for bone in setup.bones],
+        "shots": shots,
     }
-    for i, bone in enumerate(setup.bones):
-        job |= {f"bone_{i}_points": bone.surface.points, f"bone_{i}_triangles": bone.surface.triangles}
-    for i, shot in enumerate(wanted):
-        parts = {"points": shot.points, "distances": shot.distances, "outline": shot.outline}
-        parts["poses"] = np.stack([bone.pose(shot.number) for bone in setup.bones])
-        job |= {f"shot_{i}_{part}": values for part, values in parts.items() if values is not None}
-    return job
 
 
 def program(job: Path, folder: Path) -> list[str]:

@@ -27,7 +27,7 @@ class IndexEntry:
 
 
 def write(folder: Path) -> None:
-    """Write ``index.html`` of the pages in ``folder``, unless a file of that name is there that is no index of ours."""
+    """Write ``index.html`` of the pages in ``folder``, unless a file of that name exists that is not such an index."""
     path = folder / f"{NAME}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != KIND):

@@ -1,4 +1,4 @@
-"""A case and its results as lines of text: what ``show``, ``run`` and ``compare`` print."""
+"""A case and its results as lines of text, for the verbs ``show``, ``run`` and ``compare``."""
 
 import math
 from collections.abc import Iterable
@@ -12,6 +12,7 @@ from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described, find
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
+from fem_reference.report.tables import spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
@@ -20,7 +21,7 @@ PRINTED = tuple(key for key in described("table") if not key[1].endswith("_perce
 
 
 def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """Everything that a person asks of a case before solving it, as words and numbers by name."""
+    """The facts of interest on a case before it is solved, as words and numbers by name."""
     return {
         "case": case.name,
         "title": case.title,
@@ -103,7 +104,8 @@ def _known(result: Comparison) -> list[str]:
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
     lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
-    return lines + [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
+    lines += [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
+    return [*lines, *filter(None, [spread(result)])]
 
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:
@@ -113,6 +115,6 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
 
 
 def run_text(run: Run, found: Alone) -> str:
-    """The result of a run that nothing was compared with, line by line."""
+    """The result of a run without a comparison, line by line."""
     printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
     return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])

@@ -17,11 +17,14 @@ from typing import Any
 
 import jinja2
 from PIL import Image
+from pydantic import TypeAdapter
 
 from fem_reference.foundations.markup import exact
 from fem_reference.io import files
+from fem_reference.metrics import find
+from fem_reference.report import gallery
 from fem_reference.report.drawings import webp
-from fem_reference.report.words import duration, number, words
+from fem_reference.report.words import duration, listed, number, ratio, title_of, words
 
 # Where the facts stand in the frame of all pages (base.html), and where the command that made it.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
@@ -100,12 +103,9 @@ def read(path: Path) -> PageHead | None:
     try:
         with path.open("rb") as file:
             text = file.read(_HEAD).decode("utf-8", "ignore")
-        facts = json.loads(text.partition(_BEGIN)[2].partition(_END)[0])
-        head = PageHead(**facts | {"headlines": tuple((name, word, said) for name, word, said in facts["headlines"])})
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return TypeAdapter(PageHead).validate_json(text.partition(_BEGIN)[2].partition(_END)[0])
+    except (OSError, ValueError):
         return None
-    plain = (head.kind, head.title, head.asked, head.made, head.picture, *sum(head.headlines, ()))
-    return head if all(isinstance(one, str) for one in plain) else None
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
@@ -152,5 +152,14 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
+    environment.globals |= {
+        "find": find,
+        "greatest_distance": gallery.top,
+        "ramp": gallery.ramp,
+        "ratio": ratio,
+        "ticks": gallery.ticks,
+        "title_of": title_of,
+        "zip": zip,
+    }
+    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words, "listed": listed}
     return environment

@@ -1,14 +1,13 @@
-"""The program that draws the pictures of a job file: ``python -P pictures.py JOB.npz FOLDER``.
+"""The program that draws the pictures of a job file of ours: ``python -P pictures.py JOB.pickle FOLDER``.
 
 Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
 
-The job has ``top``, the end of the colour scale [mm];
-``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
-bone i as ``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses``
-(bones, 4, 4), and where it has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body
-whose outline is drawn over it. View k of shot i becomes ``i_k.webp`` in the folder.
+The job has ``top``, the end of the colour scale [mm]; ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, of each
+of the ``bones`` its points and triangles, and ``shots``: ``points`` (n, 3), ``poses`` of the bones (4, 4), ``distances`` (n,) [mm]
+to colour by, and ``outline`` (n, 3), the body whose outline is drawn over it, both or None. View k of shot i becomes ``i_k.webp``.
 """
 
+import pickle
 import sys
 from pathlib import Path
 from typing import Any
@@ -25,16 +24,13 @@ _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 
 def main(job: Path, folder: Path) -> None:
     """Draw every view of every shot."""
-    with np.load(job, allow_pickle=False) as stored:
-        arrays = dict(stored)
-    bones = [_surface(arrays[f"bone_{i}_points"], arrays[f"bone_{i}_triangles"]) for i in range(arrays["bones"])]
-    for shot in range(arrays["shots"]):
-        posed = [
-            bone.transform(pose, inplace=False) for bone, pose in zip(bones, arrays[f"shot_{shot}_poses"], strict=True)
-        ]
-        for view, direction in enumerate(arrays["directions"]):
-            image = _view(arrays, shot, posed, direction)
-            image.save(folder / f"{shot}_{view}.webp", quality=88, method=4)
+    given = pickle.loads(job.read_bytes())
+    bones = [_surface(*bone) for bone in given["bones"]]
+    for i, shot in enumerate(given["shots"]):
+        posed = [bone.transform(pose, inplace=False) for bone, pose in zip(bones, shot["poses"], strict=True)]
+        for view, direction in enumerate(given["directions"]):
+            image = _view(given, shot, posed, direction)
+            image.save(folder / f"{i}_{view}.webp", quality=88, method=4)
 
 
 def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
@@ -45,19 +41,31 @@ def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
     )
 
 
-def _view(arrays: dict[str, NDArray[Any]], shot: int, bones: list[Any], direction: NDArray[Any]) -> Image.Image:
-    points, outline = arrays[f"shot_{shot}_points"], arrays.get(f"shot_{shot}_outline")
-    distances = arrays.get(f"shot_{shot}_distances")
+def thinned(points: NDArray[Any], triangles: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Points and triangles of about ``count`` triangles in place of more, by quadric errors (Garland and Heckbert 1997,
+    doi 10.1145/258734.258849): for pictures, not for computation. ``points`` (n, 3), ``triangles`` (m, 3) of any kind.
+    """
+    import pyvista
+
+    if len(triangles) <= count:
+        return points, triangles
+    fine = pyvista.PolyData.from_regular_faces(np.asarray(points, float), triangles)
+    few = fine.decimate(1 - (count - 1) / len(triangles))
+    return np.asarray(few.points, float), np.asarray(few.regular_faces)
+
+
+def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction: NDArray[Any]) -> Image.Image:
+    points, outline, distances = (shot[name] for name in ("points", "outline", "distances"))
     camera = _camera(points, points if outline is None else outline, direction)
-    muscle = _surface(points, arrays["triangles"])
+    muscle = _surface(points, job["triangles"])
     coloured: dict[str, Any] = {"color": _MUSCLE}
     if distances is not None:
-        coloured = {"scalars": distances, "cmap": COLOURS, "clim": (0.0, max(float(arrays["top"]), 1e-12))}
+        coloured = {"scalars": distances, "cmap": COLOURS, "clim": (0.0, max(job["top"], 1e-12))}
     looks: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.7, "show_scalar_bar": False}
     picture = _render([(bone, looks | {"color": _BONE}) for bone in bones] + [(muscle, looks | coloured)], camera)
     if outline is not None:
         flat = {"color": "black", "lighting": False}
-        body = _render([(_surface(outline, arrays["triangles"]), flat)], camera)[:, :, 0] < 128
+        body = _render([(_surface(outline, job["triangles"]), flat)], camera)[:, :, 0] < 128
         picture[_rim(body)] = _LINE
     return Image.fromarray(picture).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
 

@@ -1,7 +1,6 @@
 """The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
 
 import math
-from itertools import cycle
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -12,17 +11,14 @@ from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.io.texts import finite
 from fem_reference.metrics import described
-from fem_reference.report.drawings import PALETTE, REFERENCE, Drawing, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.report.words import ratio
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
 # In the first table, which is over all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
-# Beyond the palette of curves: of Tol's muted colours those that are none of its own.
-_MORE = ("#882255", "#999933", "#332288", "#777777")
 
 
 def page(table: Table) -> Page:
@@ -31,7 +27,6 @@ def page(table: Table) -> Page:
         "table": table,
         "columns": COLUMNS,
         "over_all": OVER_ALL,
-        "ratio": ratio,
         "report_speeds": report_speeds(),
         "drawing": _drawing(table),
     }
@@ -41,12 +36,13 @@ def page(table: Table) -> Page:
 
 def facts(table: Table) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
+    scenarios = [
+        {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
+        | {"reference": one.reference.status, "message": one.reference.message}
+        for one in table.scenarios
+    ]
     return {
-        "scenarios": [
-            {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
-            | {"reference": one.reference.status, "message": one.reference.message}
-            for one in table.scenarios
-        ],
+        "scenarios": scenarios,
         "missing": table.missing,
         "report": [one.model_dump(mode="json", exclude={"of_case"}) for one in table.kinds],
         "results": [_row(one) for one in table.results],
@@ -77,38 +73,39 @@ def _row(one: SolverResult) -> dict[str, Any]:
     worst = {}
     for metric, statistic, _, unit in COLUMNS:
         found = one.worst(metric, statistic)
-        value = None if found is None else {"value": finite(found[0]), "frame": found[1], "unit": unit}
-        worst[f"{metric}.{statistic}"] = value
-    return {
-        **{name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")},
-        "needs": dict(one.needs),
-        "status": one.outcome.status,
-        "message": one.outcome.message,
-        "worst": worst,
-    }
+        worst[f"{metric}.{statistic}"] = found and {"value": finite(found[0]), "frame": found[1], "unit": unit}
+    named = {name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")}
+    ended = {"status": one.outcome.status, "message": one.outcome.message}
+    return {**named, "needs": dict(one.needs), **ended, "worst": worst}
 
 
 def _drawing(table: Table) -> Drawing:
-    """Deviation of the surface against the time of a frame, everybody on every scene."""
+    """Deviation of the surface against the time of a frame, everybody on every scene; a legend of colours and one of marks."""
+    shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
+    colours = _colours([one for one, _ in shown])
+    marks = {scenario.case: _MARKS[i % len(_MARKS)] for i, scenario in enumerate(table.scenarios)}
 
     def draw(figure: Figure, axes: Axes) -> None:
-        shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
-        colours, cases = _colours(table), [scenario.case for scenario in table.scenarios]
         for one, (x, y) in shown:
             look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
-            mark = _MARKS[cases.index(one.case) % len(_MARKS)]
-            axes.plot([x], [y], mark, color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
-        _label(figure, axes, table, [name for name in colours if any(_label_of(one) == name for one, _ in shown)])
+            axes.plot([x], [y], marks[one.case], color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
+        logarithmic(axes)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.set(xlabel="time for a frame number, ms", ylabel="% of the greatest displacement")
+        handles = [axes.plot([], [], "o", color=colour, label=name)[0] for name, colour in colours.items()]
+        handles += [axes.plot([], [], mark, color="#777777", label=case)[0] for case, mark in marks.items()]
+        figure.legend(handles=handles, loc="outside right upper")
 
-    return drawn(
-        "ranking", "Surface deviation (rms, worst frame) against the time for a frame number", (9.6, 4.6), draw
-    )
+    title = "Surface deviation (rms, worst frame) against the time for a frame number"
+    return drawn("ranking", title, (9.6, 4.6), draw)
 
 
-def _colours(table: Table) -> dict[str, str]:
-    """A colour for everybody who is drawn."""
-    names = dict.fromkeys(_label_of(one) for one in table.results if not one.of_reference and _place(one) is not None)
-    return {"reference": REFERENCE} | dict(zip(names, cycle([*PALETTE, *_MORE]), strict=False))
+def _colours(results: list[SolverResult]) -> dict[str, str]:
+    """A colour for everybody who is drawn, the reference first."""
+    names = dict.fromkeys(_label_of(one) for one in sorted(results, key=lambda one: not one.of_reference))
+    first = 0 if any(one.of_reference for one in results) else 1
+    return {name: colour_of(i) for i, name in enumerate(names, first)}
 
 
 def _label_of(one: SolverResult) -> str:
@@ -122,17 +119,3 @@ def _place(one: SolverResult) -> tuple[float, float] | None:
     if worst is None or one.seconds_per_frame is None or not (math.isfinite(worst[0]) and worst[0] > 0):
         return None
     return 1000 * one.seconds_per_frame, worst[0]
-
-
-def _label(figure: Figure, axes: Axes, table: Table, names: list[str]) -> None:
-    """Axes in the words of the table; a legend of colours and one of marks."""
-    logarithmic(axes)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.set_xlabel("time for a frame number, ms")
-    axes.set_ylabel("% of the greatest displacement")
-    colours = _colours(table)
-    hues = [axes.plot([], [], "o", color=colours[name], label=name)[0] for name in names]
-    cases = [one.case for one in table.scenarios]
-    marks = [axes.plot([], [], _MARKS[i % len(_MARKS)], color="#777777", label=case)[0] for i, case in enumerate(cases)]
-    figure.legend(handles=[*hues, *marks], loc="outside right upper")

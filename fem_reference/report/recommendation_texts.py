@@ -10,13 +10,12 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
     best, near = found.best, found.nearest
     return {
         "metric": metric,
-        "recommended": None if best is None else best.point.choice,
-        "error": None if best is None else best.error,
-        "bar": None if best is None or not found.measured else best.bar,
-        "seconds_per_frame": None if best is None else best.time,
-        "nearest": None
-        if near is None
-        else {"choice": near.point.choice, "error": near.error, "bar": near.bar, "seconds_per_frame": near.time},
+        "recommended": best and best.point.choice,
+        "error": best and best.error,
+        "bar": best.bar if best and found.measured else None,
+        "seconds_per_frame": best and best.time,
+        "nearest": near
+        and {"choice": near.point.choice, "error": near.error, "bar": near.bar, "seconds_per_frame": near.time},
         "settings_considered": found.count,
         "measured_on": list(found.of),
         "margin_error": found.margins.error,

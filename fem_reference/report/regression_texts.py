@@ -1,7 +1,6 @@
-"""A check in words: as text, as JSON, as Markdown for a pull request, and as JUnit XML for what shows the tests of a pipeline."""
+"""A check in words: as text, JSON, Markdown for a pull request, and JUnit XML for the test page of a pipeline."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
@@ -89,22 +88,16 @@ def junit(check: Check, seconds: float) -> str:
     return _xml(root)
 
 
-@dataclass(frozen=True)
-class Lost:
-    """The texts of ``junit`` and ``markdown`` where nothing could be judged."""
-
-    junit: str
-    markdown: str
-
-
-def lost(case: str, candidate: str, why: list[str]) -> Lost:
-    """A suite with one error, and a headline, with ``why`` nothing could be judged: what an earlier check left would mislead."""
+def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
+    """A JUnit suite with one error, and a headline in Markdown, with the reason ``why`` nothing was judged: older files would
+    mislead.
+    """
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
     ElementTree.SubElement(element, "error", {"message": why[0]}).text = reasons
     lines = [f"### failed: {_escaped(candidate)} on {_escaped(case)}", "", *(f"- {reason}" for reason in why)]
-    return Lost(_xml(root), "\n".join(lines) + "\n")
+    return _xml(root), "\n".join(lines) + "\n"
 
 
 def _suite(name: str, counts: dict[str, str]) -> tuple[ElementTree.Element, ElementTree.Element]:

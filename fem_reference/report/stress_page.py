@@ -1,4 +1,4 @@
-"""The page of hard cases: a matrix of cases by solvers, and what happened in each cell."""
+"""The page of hard cases: a matrix of cases by solvers, with the result in each cell."""
 
 from typing import Any
 

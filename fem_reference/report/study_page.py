@@ -1,4 +1,4 @@
-"""The page of a study: error against cost, who is best at the same cost or error, what half the error costs."""
+"""The page of a study: error against cost, the best solver at the same cost or error, the cost of half the error."""
 
 import json
 from collections.abc import Sequence
@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, solvers
+from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
 from fem_reference.assessment.transfer import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
-from fem_reference.report.drawings import BAND, PALETTE, Drawing, drawn, logarithmic
+from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
 from fem_reference.report.words import duration, listed, number
 from fem_reference.report.words import title_of as in_words
@@ -26,7 +26,6 @@ TIME = "seconds_per_frame"
 # What the tables are about and matched by.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
-_COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
 
 
 def page(study: Study) -> Page:
@@ -39,7 +38,7 @@ def page(study: Study) -> Page:
         "main": MAIN,
         "costs": COSTS,
         "solvers": solvers,
-        "fronts": front_drawings,
+        "front": front,
         "sentences": sentences,
         "matched": matched,
         "left_out": left_out,
@@ -99,49 +98,43 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
-    """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
-    points = case.counted
-    tables = [
+    """Tables at the same time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
+    asked = [(case.counted, cost, cost, error) for cost in MATCHED]
+    # What "at most" means of an error here is what it means to the verb recommend.
+    asked.append((case.certain, TIME, error, TIME))
+    return [
         (
-            cost,
-            error,
-            [fronts.at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)],
+            same,
+            compared,
+            [match(points, error, cost, same=same, at=at) for at in levels(points, error, cost, same=same)],
         )
-        for cost in MATCHED
+        for points, cost, same, compared in asked
     ]
-    certain = case.certain  # what "at most" means of an error here is what it means to the verb recommend
-    rows = [fronts.at_same_error(certain, error, TIME, at) for at in levels(certain, error, TIME, of_error=True)]
-    return [*tables, (error, TIME, rows)]
 
 
 def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
-    """The error of one of the points of a table as it was measured, without the bar of the truth; None of the truth itself."""
+    """The measured error of a point of a table, without the bar of the truth; None for the truth itself."""
     return None if point.is_truth else point.errors[error] - case.bars.get(error, 0.0)
 
 
 def left_out(case: CaseStudy) -> list[Point]:
-    """The points that are on no front since they did not reach all frames, or were refused."""
+    """The points that did not reach all frames or were refused, and so are on no front."""
     return [point for point in case.points if point.status != "converged"]
 
 
-def front_drawings(case: CaseStudy) -> list[Drawing]:
-    """Error against time, a drawing for each of the statistics shown."""
-    return [_front(case, error) for error in shown(case)]
-
-
-def _front(case: CaseStudy, error: str) -> Drawing:
+def front(case: CaseStudy, error: str) -> Drawing:
+    """Error against time, of one of the statistics shown."""
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
         for i, solver in enumerate(solvers(case.points)):
             pairs = [pair for pair in shown_points(case) if pair[0].solver == solver]
-            _draw(axes, pairs, error, solver, _COLOURS[i % len(_COLOURS)])
+            _draw(axes, pairs, error, solver, colour_of(i))
         logarithmic(axes)
         if (bar := case.bars.get(error, 0.0)) > 0:
             axes.set_ylim(bottom=min(axes.get_ylim()[0], bar / 2))
             axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
-        axes.set_xlabel("time of a frame, s")
-        axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
+        axes.set(xlabel="time of a frame, s", ylabel=f"{title_of(error)}, {case.units[error]}")
         if axes.get_legend_handles_labels()[0]:
             figure.legend(loc="outside lower center", ncols=3, fontsize="small")
 
@@ -149,7 +142,7 @@ def _front(case: CaseStudy, error: str) -> Drawing:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """The points as drawings show them, below the truth's bar too where they were measured there, and as they count."""
+    """Pairs of each point with its measured error, also below the truth's bar, and with the error that counts."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)
@@ -185,7 +178,8 @@ def _data(study: Study) -> dict[str, Any]:
         | {"points": [facts(one) for one, _ in shown_points(case) if one.status == "converged"]}
         for case in study.cases
     ]
-    return {"costs": COSTS, "reference": REFERENCE, "colours": _COLOURS, "cases": cases}
+    colours = [colour_of(i) for i in range(len(solvers(study.points)))]
+    return {"costs": COSTS, "reference": REFERENCE, "colours": colours, "cases": cases}
 
 
 def text(study: Study) -> str:

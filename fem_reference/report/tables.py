@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment import ranking, second_check
-from fem_reference.assessment.comparison import Alone, Comparison, Convergence
+from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.assessment.judge import Verdict
-from fem_reference.io.texts import finite
+from fem_reference.assessment.judge import Verdict, Word
+from fem_reference.io.texts import finite, plain
 from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
@@ -19,24 +19,25 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
+# The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
+SPREAD = (
+    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them "
+    "(5.3 and 8.8 % on two muscles of the hip): the error bars of forces and moments leave that out"
+)
+
 
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
-    forces and inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest``
+    forces and inversion numbers that its solver recorded; ``doubts`` the reasons to doubt the reference, in words; ``from_rest``
     the change from rest of every run, with its forces; ``error_bars`` the error bars of the reference and ``rankings`` the solvers
     that they separate, both empty without bars.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
     from_rest = {run.name: rows(run, (*comparison.changes[run.name], *exerted(run))) for run in comparison.runs}
-    facts = {
-        "case": comparison.scene.name,
-        "solver": reference.solver,
-        "status": reference.outcome.status,
-        "message": reference.outcome.message,
-        "verdict": comparison.word,
+    facts = _head(comparison.scene, reference, comparison.word) | {
         "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in comparison.runs},
@@ -46,22 +47,22 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
         "rankings": ranking.facts(comparison.rankings),
     }
-    return facts | ({"convergence": [_ladder(ladder) for ladder in comparison.ladders]} if comparison.ladders else {})
+    return facts | ({"convergence": plain(comparison.ladders)} if comparison.ladders else {})
 
 
 def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
-    """The result of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
-    return {
-        "case": case.name,
-        "solver": run.solver,
-        "status": run.outcome.status,
-        "message": run.outcome.message,
-        "verdict": found.word,
+    """The result of a ``run`` without a comparison, with the keys of :func:`summary`."""
+    return _head(case, run, found.word) | {
         "cost": {run.name: run.outcome.cost},
         "measures": rows(run, found.measures),
         "verdicts": [_verdict(verdict) for verdict in found.verdicts],
         "folder": str(run.folder),
     }
+
+
+def _head(case: Case, run: Run, word: Word) -> dict[str, Any]:
+    ended = {"status": run.outcome.status, "message": run.outcome.message}
+    return {"case": case.name, "solver": run.solver, **ended, "verdict": word}
 
 
 def as_csv(rows: Iterable[dict[str, Any]]) -> str:
@@ -76,6 +77,12 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
     """The error bars of the reference, if there are any."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
+
+
+def spread(comparison: Comparison) -> str:
+    """The sentence on what error bars of forces leave out; empty where none are known or no attachment is by springs."""
+    forces = any(bar.metric == "joint_moment" for bar in known(comparison))
+    return SPREAD if forces and any(one.stiffness is not None for one in comparison.setup.attached) else ""
 
 
 def inversion(run: Run) -> tuple[Measure, ...]:
@@ -104,11 +111,6 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
     ]
 
 
-def _ladder(ladder: Convergence) -> dict[str, Any]:
-    errors = [finite(error) for error in ladder.errors]
-    return vars(ladder) | {"errors": errors, "order": finite(ladder.order)}
-
-
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
     """One row a frame; ``model``: by how much exact attachments change the statistic, where they are springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
@@ -126,6 +128,5 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
         **{name: getattr(expectation, name) for name in ("of", "metric", "statistic", "kind", "because")},
         **{name: getattr(verdict, name) for name in ("frame", "truth", "within", "unit")},
         "expected_at": expectation.frame,
-        "value": finite(verdict.value),
-        "error_bar": None if verdict.error_bar is None else finite(verdict.error_bar),
+        **plain({"value": verdict.value, "error_bar": verdict.error_bar}),
     }

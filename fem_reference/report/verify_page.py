@@ -5,14 +5,24 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocator
+
 from fem_reference.assessment.catalogue import Result, Verification
-from fem_reference.io.texts import finite
-from fem_reference.report import verify_figures
+from fem_reference.foundations.mesh import Floats
+from fem_reference.io.texts import finite, plain
+from fem_reference.report.drawings import PALETTE, Drawing, drawn, positive
 from fem_reference.report.pages import Page
-from fem_reference.report.words import duration
+from fem_reference.report.words import duration, number, words
 
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
+PASS, FAIL = "#14713a", "#b3261e"
+LEAST, GREATEST = 1e-8, 1e3  # shares of the tolerance that the overview can show; what is beyond stands at its edge
+_ROW = 0.175  # height of a row of the overview [in]
 
 
 def page(verification: Verification) -> Page:
@@ -22,10 +32,10 @@ def page(verification: Verification) -> Page:
     contents = {
         "verification": verification,
         "kinds": Counter(one.entry.kind for one in results),
-        "share": verify_figures.share,
+        "share": share,
         "spent": duration(math.fsum(one.seconds for one in results)),
-        "overview": verify_figures.overview(verification.groups),
-        "ladders": [verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
+        "overview": overview(verification.groups),
+        "ladders": [convergence(one) for one in results if drawable(one)],
     }
     said = (("", verification.word, passed),)
     title = "Verification: problems whose answers are known"
@@ -71,11 +81,116 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
             "verdict": one.word,
             "value": finite(one.finding.value),
             **{name: finite(getattr(one, name)) for name in ("truth", "error", "within")},
-            "order": None if one.finding.order is None else finite(one.finding.order),
-            "ladder": [[finite(size), finite(value)] for size, value in one.finding.ladder],
+            **plain({name: getattr(one.finding, name) for name in ("order", "ladder")}),
             "seconds": one.seconds,
             "note": one.finding.note,
             "with_negative_control": one.with_negative_control,
         }
         for one in results
     ]
+
+
+def share(one: Result) -> float:
+    """The error as a share of its bound, NaN where nothing was measured; infinite where no error is allowed and there is one."""
+    if one.within > 0:
+        return one.error / one.within
+    return one.error * math.inf if one.error else 0.0
+
+
+def overview(groups: dict[str, list[Result]]) -> Drawing:
+    """The error of every result as a share of its tolerance, group by group."""
+    results = [one for group in groups.values() for one in group]
+    shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
+    low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
+    high = 10.0 ** math.ceil(math.log10(max([3.0, *shown])))
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        row = 0
+        for group, members in groups.items():
+            axes.text(
+                -0.01, row, words(group), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
+            )
+            axes.axhline(row - 0.7, color="#dddddd", linewidth=0.8)
+            for place, one in enumerate(members, row + 1):
+                label = axes.text(
+                    -0.01, place, one.entry.name, transform=axes.get_yaxis_transform(), ha="right", va="center"
+                )
+                label.set_color("#1d1d1f" if one.word == "pass" else FAIL)
+                _dot(axes, place, one, (low, high))
+            row += len(members) + 1
+        axes.set_ylim(row - 0.3, -0.7)
+        _style_overview(figure, axes, (low, high))
+
+    rows = len(results) + len(groups)
+    title = "Error as a share of what is allowed"
+    return drawn("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
+
+
+def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
+    """A result at its share; a hollow triangle at the edge beyond which it is, a cross where it is not a number."""
+    low, high = limits
+    value = share(one)
+    look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}
+    if math.isnan(value):
+        axes.plot([high], [row], "x", **look)
+    elif low < value <= high:
+        axes.plot([value], [row], "s" if one.with_negative_control else "o", **look)
+    else:
+        axes.plot([min(max(value, low), high)], [row], "<" if value <= low else ">", markerfacecolor="white", **look)
+
+
+def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> None:
+    axes.axvspan(1.0, limits[1], color=FAIL, alpha=0.05, linewidth=0)
+    axes.axvline(1.0, color=FAIL, linewidth=1.4)
+    axes.set(xscale="log", xlim=limits)
+    axes.xaxis.set_major_locator(LogLocator(numticks=12))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_yticks([])
+    axes.grid(visible=True, axis="x")
+    axes.tick_params(top=True, labeltop=True)
+    axes.set_xlabel("error / tolerance")
+    marks = {
+        "passes": ("o", PASS, PASS),
+        "fails": ("o", FAIL, FAIL),
+        "fails, negative control": ("s", FAIL, FAIL),
+        "smaller than shown, or exactly zero": ("<", PASS, "white"),
+        "greater than shown": (">", FAIL, "white"),
+        "not a number": ("x", FAIL, FAIL),
+    }
+    handles = [
+        Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=inner, label=label, markersize=5.5)
+        for label, (mark, colour, inner) in marks.items()
+    ]
+    figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=1, columnspacing=1.4)
+
+
+def drawable(one: Result) -> bool:
+    """True with two meshes or more whose errors can stand on a logarithmic axis."""
+    return len(_errors(one)[0]) > 1
+
+
+def convergence(one: Result) -> Drawing:
+    """Error over mesh size on logarithmic axes, beside the whole power that is nearest to its order."""
+    sizes, errors = _errors(one)
+    order = one.finding.order
+
+    def draw(_: Figure, axes: Axes) -> None:
+        known = order is not None and math.isfinite(order)
+        axes.loglog(sizes, errors, "o-", color=PALETTE[0], label=f"order {number(order)}" if known else "no order")
+        if known and order is not None and round(order) > 0:
+            power = round(order)
+            guide = errors[-1] * (sizes / sizes[-1]) ** power
+            axes.loglog(sizes, guide, "--", color="#888888", linewidth=1, label=f"slope {power}", zorder=1)
+        axes.xaxis.set_major_locator(FixedLocator(list(sizes)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(lambda size, _: number(size))
+        axes.set(xlabel="mesh size [mm]", ylabel=f"error [{one.entry.unit}]")
+        axes.legend(handlelength=2)
+
+    return drawn(f"ladder-{one.entry.name}", one.entry.name, (3.7, 2.7), draw)
+
+
+def _errors(one: Result) -> tuple[Floats, Floats]:
+    """Sizes and errors of the meshes whose error is a positive number."""
+    sizes, values = np.array(one.finding.ladder, float).reshape(-1, 2).T
+    return positive(sizes, np.abs(values - one.truth))

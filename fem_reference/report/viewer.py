@@ -32,10 +32,9 @@ from numpy.typing import NDArray
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
-from fem_reference.geometry.coarsening import thin
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
-from fem_reference.report.viewer_fields import Fields, arrows, joints
+from fem_reference.report.viewer_fields import Fields, arrows, at_numbers, joints
 from fem_reference.runs.store import Run
 
 THREE = Path(__file__).parent / "three"
@@ -44,27 +43,6 @@ THREE = Path(__file__).parent / "three"
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
-
-
-@dataclass(frozen=True)
-class Viewer:
-    """The contents of its template: the ``data`` for the script, the names of the ``candidates`` drawn and of the ``quantities`` to
-    colour by, the frame numbers, one frame in how many is drawn, the greatest error of a coordinate [mm], the colours of
-    fibres, where on their scale [%] which stretches are, the greatest force drawn [N], 0 without any, and the library's version
-    and licence.
-    """
-
-    data: str
-    candidates: tuple[str, ...]
-    quantities: tuple[str, ...]
-    numbers: tuple[int, ...]
-    every: int
-    error: float
-    warm: tuple[str, ...]
-    stretches: tuple[tuple[float, float], ...]
-    force: float
-    version: str
-    licence: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +66,34 @@ class _Box:
         return {"low": self.low.tolist(), "step": self.step}
 
 
-def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
-    """The 3D view of a comparison; where its positions would have more bytes than ``budget`` only of every k-th frame."""
-    reference = comparison.reference
-    shown = [reference, *(run for run in comparison.candidates if run.has_surface)]
+def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
+    """The contents of the template of the 3D view: the ``data`` for the script, the names of the ``candidates`` and ``quantities``,
+    the frame ``numbers``, one frame in how many is drawn (``every``: more than one where positions would have more bytes than
+    ``budget``), the greatest ``error`` of a coordinate [mm], the colours of fibres (``warm``) and where on their scale [%] which
+    ``stretches`` are, the greatest ``force`` drawn [N], 0 without any, and ``version`` and ``licence`` of the library.
+    """
+    shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
     every = _every(shown, budget)
-    numbers = reference.numbers[::every]
+    data, card = _data(comparison, shown, every), tomllib.loads((THREE / "card.toml").read_text(encoding="utf-8"))
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return {
+        "data": text.replace("<", "\\u003c"),  # no name in it ends the script
+        "candidates": [run.name for run in shown[1:]],
+        "quantities": [one["name"] for one in data["quantities"]],
+        "numbers": data["frames"],
+        "every": every,
+        "error": data["step"] / 2,
+        "warm": data["warm"],
+        "stretches": _ends(data["fibres"]),
+        "force": data["force"],
+        "version": card["version"],
+        "licence": (THREE / "LICENSE").read_text(encoding="utf-8"),
+    }
+
+
+def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any]:
+    """The object that this module's text describes, of the runs ``shown``, the reference first."""
+    reference, numbers = comparison.reference, comparison.reference.numbers[::every]
     frames = {run.name: _frames(run, numbers) for run in shown}
     own = np.concatenate([reference.surface.points[None], frames[reference.name]])  # even where it reached no frame
     box = _box(own, list(frames.values()))
@@ -106,8 +106,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
         row["forces"] = arrows(run, comparison.setup, numbers)
         row["points"] = _positions(_last_finite(own_points), box)
     distance = [{"name": "distance", "signed": False, "top": top}] if len(shown) > 1 else []
-    version, licence = _library_facts()
-    data = {
+    return {
         "library": _library(),
         "frames": numbers,
         "colours": _stops(pictures.COLOURS),
@@ -124,9 +123,6 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
         **box.facts(),
         "runs": runs,
     }
-    names, chosen = tuple(run.name for run in shown[1:]), tuple(one["name"] for one in data["quantities"])
-    warm, ends = tuple(data["warm"]), _ends(data["fibres"])
-    return Viewer(_json(data), names, chosen, numbers, every, box.step / 2, warm, ends, data["force"], version, licence)
 
 
 def _greatest_force(runs: list[dict[str, Any]]) -> float:
@@ -154,10 +150,8 @@ def _every(shown: list[Run], budget: int) -> int:
 
 def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
     """Positions (f, n, 3) of a run at frame ``numbers``, NaN all over where one is not wholly known."""
-    found = dict(zip(run.numbers, run.positions, strict=True))
-    lost = np.full_like(run.surface.points, np.nan)
-    chosen = (found.get(number, lost) for number in numbers)
-    return np.stack([points if np.isfinite(points).all() else lost for points in chosen])
+    known = np.isfinite(run.positions).all(axis=(1, 2), keepdims=True)
+    return at_numbers(run, np.where(known, run.positions, np.nan), numbers)
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
@@ -214,12 +208,12 @@ def _positions(frames: Floats, box: _Box) -> str:
 
 
 def _bone(bone: Bone, numbers: tuple[int, ...]) -> dict[str, Any]:
-    surface = thin(bone.surface, BONE_TRIANGLES)
-    box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
+    points, triangles = pictures.thinned(bone.surface.points, bone.surface.triangles, BONE_TRIANGLES)
+    box = _Box.around(points.min(axis=0), points.max(axis=0))
     return {
         "name": bone.name,
-        "triangles": _packed(surface.triangles.astype("<u4").tobytes()),
-        "positions": _positions(surface.points[None], box),
+        "triangles": _packed(triangles.astype("<u4").tobytes()),
+        "positions": _positions(points[None], box),
         "poses": [bone.pose(number).ravel().tolist() for number in numbers],
         **box.facts(),
     }
@@ -241,16 +235,5 @@ def _library() -> dict[str, str]:
     return {path.name: _packed(path.read_bytes()) for path in sorted(THREE.glob("*.js"))}
 
 
-def _library_facts() -> tuple[str, str]:
-    """Version and licence text of three.js as it lies beside this file."""
-    card = tomllib.loads((THREE / "card.toml").read_text(encoding="utf-8"))
-    return card["version"], (THREE / "LICENSE").read_text(encoding="utf-8")
-
-
 def _packed(values: bytes) -> str:
     return base64.b64encode(gzip.compress(values, 9, mtime=0)).decode()
-
-
-def _json(data: dict[str, Any]) -> str:
-    """The ``data`` as text that may stand in a page's script: no name in it can end that."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -3,7 +3,7 @@
 quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
             magnitude; points: of the fibres, as positions
-bars        by quantity and frame, how far [mm] the reference may be from the truth; null where it is not known, nothing without any
+bars        by quantity and frame the error bar [mm] of the reference; null where it is unknown, absent without bars
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
 forces      of each run by frame the arrows: point of application [mm] and force on a bone [N], six numbers each
 joints      of each bone that moves its name, unit, and by frame the angle or the distance
@@ -32,6 +32,12 @@ _LEVELS = 127
 # The statistic of the surface's deviation that is the greatest of a quantity.
 _BARS = {"distance": "max", "surface": "hausdorff"}
 _FAR = 1e6  # [mm]: beyond, a fibre is nowhere
+
+
+def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
+    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN where it has no such frame."""
+    rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
+    return np.stack([rows.get(number, lost) for number in numbers])
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +69,7 @@ class Fields:
         """Positions (f, m, 3) [mm] of the fibre points drawn in a run, NaN in a frame that is not known."""
         found = np.array(local_fields.fibre_points(run, self.context)[:, self.lines[1]])
         found[~(np.abs(found) < _FAR).all(axis=(1, 2))] = np.nan
-        return self._at_numbers(run, found)
+        return at_numbers(run, found, self.numbers)
 
     @cached_property
     def surfaces(self) -> dict[str, dict[str, Floats]]:
@@ -72,15 +78,10 @@ class Fields:
         found: dict[str, dict[str, Floats]] = {"surface": {}, "depth": {}}
         for run in self.runs:
             if run is not reference:
-                found["surface"][run.name] = self._at_numbers(run, local_fields.to_surface(run, reference))
+                found["surface"][run.name] = at_numbers(run, local_fields.to_surface(run, reference), self.numbers)
             if (gaps := local_fields.to_bones(run, self.context)) is not None:
-                found["depth"][run.name] = self._at_numbers(run, np.fmax(-gaps, 0))
+                found["depth"][run.name] = at_numbers(run, np.fmax(-gaps, 0), self.numbers)
         return {name: values for name, values in found.items() if values}
-
-    def _at_numbers(self, run: Run, values: Floats) -> Floats:
-        rows = dict(zip(run.numbers, values, strict=True))
-        lost = np.full(values.shape[1:], np.nan)
-        return np.stack([rows.get(number, lost) for number in self.numbers])
 
     def quantities(self) -> list[dict[str, Any]]:
         """The quantities that can be chosen, beside the distance, which the positions give."""

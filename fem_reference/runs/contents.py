@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Name, Record, increasing
 from fem_reference.io import files, texts
@@ -100,3 +102,14 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
             "bone", f'"{name}"', f"one of {known}" if known else "a run of the reference: no force is known"
         )
     return np.stack([scalars[key] for key in keys], axis=1)
+
+
+def point(centre: ArrayLike) -> Floats:
+    """The point (3,) [mm] that a ``centre`` is; InputError unless it is three finite numbers."""
+    try:
+        found = np.asarray(centre, float)
+    except (TypeError, ValueError, OverflowError):
+        found = np.full(1, np.nan)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise InputError("centre", said(centre), "a point: three finite numbers [mm]")
+    return found

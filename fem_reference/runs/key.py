@@ -2,7 +2,6 @@
 
 import ast
 import hashlib
-import importlib.metadata
 import json
 import os
 import platform
@@ -10,6 +9,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
+from fem_reference.foundations import version
 from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
@@ -72,13 +72,7 @@ def made_with(manner: str = "") -> dict[str, str]:
 
 def versions() -> dict[str, str]:
     """The versions of the packages that a run may depend on, and of Python."""
-    found = {"python": platform.python_version()}
-    for package in _MADE_WITH:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
+    return {"python": platform.python_version(), **version.versions(_MADE_WITH)}
 
 
 def _files(folder: Path) -> set[Path]:

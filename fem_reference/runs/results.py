@@ -4,19 +4,21 @@ A run solved with ``store_state = true`` keeps its unknowns. All results follow 
 functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import roots_jacobi
 
-from fem_reference.effects import Effect, State
+from fem_reference.effects import Effect, Energy, State, elastic_state
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.jets import JET_FUNCTIONS, variables
-from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors
+from fem_reference.foundations.material_point import NUMPY, Functions
+from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
 from fem_reference.problems.stresses import AT_ONCE, first_piola
@@ -96,6 +98,20 @@ class Results:
             places = _Places(self, state, np.asarray(tets[some], np.int64), barycentric[some])
             parts.append(places.values(wanted, acting))
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
+
+    def energies(self, frame: float) -> dict[str, float]:
+        """The energy [N mm] of each effect that has one, by its name in scene files, at a frame number of ``frames``: by virtual
+        work, minus its slope in the angle of a joint is its share of the moment. Contact and springs are not among them.
+        """
+        state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
+        acting = [(effect, effect.amount(frame)) for effect in self.effects]
+        volumes = tet_volumes(self.mesh.points, self.mesh.tets)
+        for some in np.array_split(np.arange(len(volumes)), len(volumes) * len(rule) // AT_ONCE + 1):
+            places = _Places(self, state, np.repeat(some, len(rule)), np.tile(rule, (len(some), 1)))
+            weights = np.outer(volumes[some], shares).ravel()
+            for name, density in places.energies(acting):
+                found[name] = found.get(name, 0.0) + float((weights * density).sum())
+        return found
 
     def names(self, state: NodalState) -> tuple[str, ...]:
         """Names of the results that follow from a state."""
@@ -189,27 +205,50 @@ class _Places:
         (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
         with np.errstate(all="ignore"):  # where det F is not positive
-            first = first_piola(acting, self._state(), len(self.tets))
+            jets = variables(self.F.reshape(-1, 9).T, curved=False)
+            now = self._state([jets[0:3], jets[3:6], jets[6:9]], JET_FUNCTIONS)
+            first = first_piola(acting, now, len(self.tets))
             stress = np.einsum("nik,njk->nij", first, self.F) / self.det_F[:, None, None]
         stress[~(self.det_F > 0)] = np.nan
         return np.asarray(stress)
 
-    def _state(self) -> State:
-        """The points as effects see them, with the entries of F as variables."""
-        state, jets = self.state, variables(self.F.reshape(-1, 9).T)
+    def energies(self, acting: Sequence[tuple[Effect, float]]) -> Iterator[tuple[str, Floats]]:
+        """The name of each effect with an energy, and that per rest volume (n,) [MPa]."""
+        with np.errstate(all="ignore"):  # where det F is not positive
+            now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
+            for effect, amount in acting:
+                if isinstance(effect, Energy):
+                    yield type(effect).__module__.rpartition(".")[2], effect.energy(replace(now, amount=amount))
+
+    def _state(self, F: Sequence[Sequence[Any]], functions: Functions) -> State:
+        """The points as effects see them, with the entries of ``F`` as numbers or variables."""
+        state = self.state
         passed = state.before if len(state.before) else np.zeros_like(state.displacement)
         before, F_before = self._moved(passed)
         fibre = None if self.results.fibre is None else list(self.results.fibre[self.tets].T)
         return State(
-            F=[jets[0:3], jets[3:6], jets[6:9]],
+            F=F,
             displacement=list(self.displacement.T),
             pressure=self.pressure,
             fibre=fibre,
             before=list(before.T),
             F_before=[list(row) for row in np.moveaxis(F_before, 0, -1)],
             rate=state.rate,
-            functions=JET_FUNCTIONS,
+            functions=functions,
         )
+
+
+@cache
+def _rule() -> tuple[Floats, Floats]:
+    """Barycentric coordinates (27, 4) and shares of the volume (27,) of a rule that is exact to degree 5: Gauss-Jacobi points on
+    lines to one corner, on those of the opposite side to another, and along its edge (Stroud 1971, conical product).
+    """
+    (u, a), (v, b), (w, c) = (roots_jacobi(3, power, 0) for power in (2, 1, 0))
+    x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
+    rest = (1 - x) * (1 - y)
+    shares = a[:, None, None] * b[:, None] * c
+    corners = np.stack([x, (1 - x) * y, rest * z, rest * (1 - z)], axis=-1).reshape(-1, 4)
+    return corners, shares.ravel() / shares.sum()
 
 
 def von_mises(stress: Floats) -> Floats:

@@ -27,7 +27,7 @@ from fem_reference.io import files, texts
 from fem_reference.problems.body import Body
 from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.contents import Contents, Status, frame_file, scalar_vectors
+from fem_reference.runs.contents import Contents, Status, frame_file, point, scalar_vectors
 from fem_reference.runs.states import FIELD, VALUES, NodalField, NodalState, read_field
 from fem_reference.scenes.case import Part
 
@@ -49,7 +49,7 @@ class Frame:
     negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
     max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
     number of cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa]
-    and the contact_area at rest [mm2].
+    and the contact_area at rest [mm2]; of a muscle the stresses of ``stress_statistics``, as stress_von_mises_p95 [MPa].
     """
 
     number: float
@@ -151,7 +151,7 @@ class Run:
 
     def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:
         """The moment (f, 3) [N mm] of that force about the point ``centre`` (3,) [mm]."""
-        return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(np.asarray(centre, float), self.force(bone))
+        return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(point(centre), self.force(bone))
 
     def _repr_html_(self) -> str:
         """The run as notebooks display it."""

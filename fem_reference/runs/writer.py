@@ -74,7 +74,7 @@ def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
 
 
 def pass_on(folder: Path, to: Path) -> None:
-    """Let the run of the folder ``to`` continue from the kept part of the stopped one in ``folder``, unless it has its own."""
+    """Let the run in the folder ``to`` continue from the stored part of that in ``folder``, unless it has its own."""
     if (folder / RESTART).is_dir() and not to.exists():
         with tempfile.TemporaryDirectory(dir=to.parent) as new:
             copy = shutil.copytree(folder, Path(new) / to.name)

@@ -1,4 +1,4 @@
-"""The keys and behaviour that every case has, whatever is solved in it: muscles and scalar fields add keys of their own.
+"""The keys and behaviour of every case; cases of muscles and of scalar fields add keys of their own.
 
 ``Case.key`` names a case by what determines its solution, the content of its files included.
 """
@@ -120,7 +120,7 @@ class Case(Record):
 
     @property
     def acting(self) -> dict[str, Any]:
-        """The effects by what each is called beside the others."""
+        """The effects by their names, distinct in this case."""
         return {type(effect).__name__: effect for effect in self.effects}
 
     @property
@@ -173,8 +173,8 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """InputError where a scene file names what is, links followed, in no folder that it may read. A case that a program made
-        may read whatever the program may.
+        """Raise InputError where a scene file names a file that is, links followed, in no folder that it may read. A case made
+        by a program may read any file that the program may.
         """
         if not self.from_file:
             return

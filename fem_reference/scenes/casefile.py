@@ -100,7 +100,7 @@ def _near(table: dict[str, Any], parts: list[str | int]) -> str:
 
 
 def setting(text: str) -> tuple[str, Any]:
-    """``KEY=VALUE`` of the command line as a key and a TOML value; what is no TOML value is text.
+    """``KEY=VALUE`` of the command line as a key and a TOML value; any other value is text.
 
     >>> setting("candidate[1].peclet=10"), setting("domain.mesh.triangles=delaunay")
     (('candidate[1].peclet', 10), ('domain.mesh.triangles', 'delaunay'))
@@ -182,7 +182,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
 
 
 def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The effects of a ``kind`` that are written below the key ``effect``, each once; as it is, what is no list."""
+    """The effects of a ``kind`` that are written below the key ``effect``, each once; other values than lists unchanged."""
     if not isinstance(entries, list | tuple):
         return entries
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
@@ -273,7 +273,7 @@ def _check_rest(case: MuscleCase) -> None:
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Bones have a name each, contact is with some of them, and ``frames`` say how fast time passes where that matters."""
+    """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
     _check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):

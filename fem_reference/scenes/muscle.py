@@ -1,4 +1,4 @@
-"""The case of a muscle as frozen records: its bones and how they move, what acts, and which frames are wanted."""
+"""The case of a muscle as frozen records: its bones and their motion, its effects, and the requested frames."""
 
 import math
 from functools import partial
@@ -253,7 +253,7 @@ class MuscleCase(Case):
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by what each is called beside the others."""
+        """The effects by their names, distinct in this case."""
         return {effect.title: effect for effect in self.effects}
 
     @property

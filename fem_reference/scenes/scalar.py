@@ -1,4 +1,4 @@
-"""A scalar case as frozen records: where a field lives, which effects act on it, its boundary conditions, and what is expected."""
+"""A scalar case as frozen records: the domain of its field, its effects, its boundary conditions and its expectations."""
 
 from functools import partial
 from typing import Annotated, Literal, Self

@@ -15,17 +15,17 @@ from fem_reference.problems.problem import Task
 from fem_reference.scenes.case import Candidate, Case, SolverChoice
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, trades
 
-__all__ = ["check", "choice", "find", "in_table", "names", "offers", "require", "settings", "takes_effects", "trades"]
+__all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings", "takes_effects", "trades"]
 
 
 def names(task: Task | None = None) -> list[str]:
-    """The solvers there are, as scene files name them: all, or those for a ``task``."""
+    """The names of all solvers in scene files, or of those for a ``task``."""
     found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not _is_shared(module.name))
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 
 def _is_shared(module: str) -> bool:
-    """True of a ``module`` of this folder that is no solver but serves some."""
+    """True for a ``module`` of this folder that is no solver but serves some."""
     return module == "common" or module.endswith("_kernels")
 
 
@@ -79,18 +79,13 @@ def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
     return name, SolverChoice(solver=name)
 
 
-def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:
-    """MissingSoftware where the solver ``name`` needs what is not installed."""
-    find(name, place, task).require(settings)
-
-
 def takes_effects(name: str) -> bool:
     """True where the solver ``name`` simulates the effects of a scene."""
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
-    """InputError below ``place`` where ``settings`` do not suit the ``effects``."""
+    """Raise InputError below ``place`` where ``settings`` do not suit the ``effects``."""
     offer = find(name, place, task)
     suits = offer.check_effects if isinstance(offer, MuscleSolver) else None
     if suits is not None:

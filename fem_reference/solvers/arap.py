@@ -1,15 +1,14 @@
-"""ARAP, as rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
+"""ARAP, as rigid as possible: the edges around every vertex keep their shape. Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state after the bones took their pose of frame n: the vertices attached to a bone go with it exactly, and
-from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
-turns. Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
-over its own unknowns, so that the energy never rises; negative weights do not change that, as the matrix is still the
-positive one of linear elements. Attachments by springs are exact here, and there is no contact.
+Frame number n is the state after the bones took their pose of frame n. Attached vertices move with their bone exactly. From the
+state before, the method alternates between the rotations of all cells (local step) and the positions of all other vertices (global
+step). Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
+over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still the positive one
+of linear elements. Attachments by springs are exact here, and there is no contact.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -23,10 +22,10 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers import arap_kernels
-from fem_reference.solvers.common.frame_loop import carry, follow, refused, timed
+from fem_reference.solvers.arap_kernels import VertexCells, energy, fit_rotations, right_side
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, refused, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.common.state_checks import Trouble
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
@@ -58,88 +57,66 @@ class ArapSettings(Record):
     tolerance: PositiveLength | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class VertexCells:
-    """The edges around each vertex, as ``arap_kernels`` has them: ``rest`` (n, 3) [mm], ``starts`` (n + 1,), ``neighbours``
-    and ``weights`` (e,).
-    """
+def cells_of(surface: Surface, weights: Weights) -> VertexCells:
+    """The cells of a closed surface with ``weights`` named as in the settings."""
+    matrix = _edge_weights(surface, weights)
+    starts, neighbours = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
+    return VertexCells(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code wants writable arrays
 
-    rest: Floats
-    starts: Ints
-    neighbours: Ints
-    weights: Floats
 
-    @classmethod
-    def of(cls, surface: Surface, weights: Weights) -> Self:
-        """The cells of a closed surface with ``weights`` named as in the settings."""
-        matrix = _edge_weights(surface, weights)
-        starts, neighbours = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
-        return cls(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code wants writable arrays
+def laplacian(cells: VertexCells) -> Any:
+    """The sparse matrix L (n, n) of which ``L p' = b``: minus that of the report's Figure 5.5."""
+    count = len(cells.rest)
+    matrix = sparse.csr_array((cells.weights, cells.neighbours, cells.starts), shape=(count, count))
+    return sparse.diags_array(matrix.sum(axis=1)) - matrix
 
-    def rotations(self, points: Floats) -> Floats:
-        """The local step: the rotation of each cell (n, 3, 3) that fits it best at ``points`` (n, 3)."""
-        return arap_kernels.fit_rotations(points, self.rest, self.starts, self.neighbours, self.weights)
 
-    def right_side(self, rotations: Floats) -> Floats:
-        """Eq. 5.11, (n, 3) [mm]."""
-        return arap_kernels.right_side(rotations, self.rest, self.starts, self.neighbours, self.weights)
-
-    def energy(self, points: Floats, rotations: Floats | None = None) -> float:
-        """Eq. 5.10 with squares [mm2], at given ``rotations`` or at those that fit ``points`` best."""
-        turned = self.rotations(points) if rotations is None else rotations
-        return arap_kernels.energy(points, turned, self.rest, self.starts, self.neighbours, self.weights)
-
-    def laplacian(self) -> Any:
-        """The sparse matrix L (n, n) of which ``L p' = b``: minus that of the report's Figure 5.5."""
-        count = len(self.rest)
-        matrix = sparse.csr_array((self.weights, self.neighbours, self.starts), shape=(count, count))
-        return sparse.diags_array(matrix.sum(axis=1)) - matrix
+def least_energy(points: Floats, cells: VertexCells) -> float:
+    """Eq. 5.10 with squares [mm2], at the rotations that fit ``points`` (n, 3) best."""
+    return energy(points, fit_rotations(points, cells), cells)
 
 
 @dataclass(frozen=True, eq=False)
 class GlobalStep:
-    """The global step for given ``attached`` (k,) and ``free`` vertices, factorised once.
+    """The global step for given ``attached`` (k,) and ``free`` vertices (m,), factorised once.
 
-    ``rows`` of the Laplacian are kept, its columns split into ``coupling`` (rows, k) and those of ``factor``; ``fold``, of
-    least squares, is the transpose that both sides are multiplied with. ``loose`` are free vertices that no weights tie to an
-    attached one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
+    ``pick`` (m, n) is what both sides are multiplied with: the rows of free vertices, or for least squares the transpose of their
+    columns. ``coupling`` (m, k) is that of the attached vertices. ``loose`` are free vertices that no weights tie to an attached
+    one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
     """
 
     cells: VertexCells
     attached: Ints
     free: Ints
-    rows: Ints
+    pick: Any
     coupling: Any
-    fold: Any | None
     factor: Any | None
     loose: Ints
 
     @classmethod
     def of(cls, cells: VertexCells, attached: Ints, fixed: Fixed) -> Self:
         """The system with the rows of attached vertices removed, or kept for least squares."""
-        everything, laplacian = np.arange(len(cells.rest)), cells.laplacian().tocsr()
+        everything, matrix = np.arange(len(cells.rest)), laplacian(cells).tocsr()
         free = np.setdiff1d(everything, attached)
-        rows = free if fixed == "remove" else everything
-        matrix, coupling = laplacian[rows][:, free], laplacian[rows][:, attached]
-        fold = None if fixed == "remove" else matrix.T.tocsr()
-        loose = _untied(laplacian, attached)
+        columns, loose = matrix[:, free], _untied(matrix, attached)
+        pick = sparse.eye_array(len(everything), format="csr")[free] if fixed == "remove" else columns.T.tocsr()
         solvable = 0 < len(free) < len(everything) and len(loose) == 0
-        factor = factorised(matrix if fold is None else fold @ matrix) if solvable else None
-        return cls(cells, attached, free, rows, coupling, fold, factor, loose)
+        factor = factorised(pick @ columns) if solvable else None
+        return cls(cells, attached, free, pick, pick @ matrix[:, attached], factor, loose)
 
     def place(self, points: Floats, rotations: Floats) -> Floats:
         """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices where ``points`` has them."""
         moved = points.copy()
         if self.factor is not None:
-            right = self.cells.right_side(rotations)[self.rows] - self.coupling @ points[self.attached]
-            moved[self.free] = self.factor.solve(right if self.fold is None else self.fold @ right)
+            right = self.pick @ right_side(rotations, self.cells) - self.coupling @ points[self.attached]
+            moved[self.free] = self.factor.solve(right)
         return moved
 
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and what
-    went wrong with it, if anything did.
+    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and the
+    trouble with it, if any.
     """
 
     points: Floats
@@ -148,39 +125,38 @@ class Relaxed:
     trouble: Trouble | None = None
 
 
-class Alternation:
-    """A surface going from frame number to frame number, whose free vertices ``relax`` as the attached ones have moved."""
+class Alternation(MovingSurface):
+    """A surface whose free vertices ``relax`` after the attached ones have moved."""
 
     advice = "a slower motion may help"
 
     def __init__(self, setup: Setup, system: GlobalStep, relax: Callable[[Floats], Relaxed]) -> None:
-        self.setup, self.system, self.relax = setup, system, relax
-        self.checks = surface_checks(setup.surface, system.attached)
-        self.relaxed = Relaxed(setup.begin(setup.surface.points), 0, True)
-        free = len(setup.surface.points) - len(np.unique(setup.attached_vertices))
-        self.cost: dict[str, float] = {"unknowns": 3.0 * free, "local_global_steps": 0, "frames_off_tolerance": 0}
+        super().__init__(setup)
+        self.system, self.relax, self.relaxed = system, relax, Relaxed(self.points, 0, True)
+        self.cost |= {"local_global_steps": 0, "frames_off_tolerance": 0}
 
     def move(self, number: int) -> None:
         """Carry the attached vertices there, and relax."""
-        points = self.relaxed.points
-        carry(points, self.setup, number)
-        self.relaxed = self.relax(points)
+        carry(self.points, self.setup, number)
+        self.relaxed = self.relax(self.points)
+        self.points = self.relaxed.points
         self.cost["local_global_steps"] += self.relaxed.iterations
         self.cost["frames_off_tolerance"] += not self.relaxed.met
 
     def trouble(self) -> Trouble | None:
         """The trouble with the surface, or with how it relaxed."""
-        return first_trouble(self.checks, self.relaxed.points) or self.relaxed.trouble
+        return super().trouble() or self.relaxed.trouble
 
     def frame(self, number: int) -> Frame:
         """The surface and its energy."""
-        points = self.relaxed.points
-        return Frame(number, points.copy(), scalars={"arap_energy_mm2": self.system.cells.energy(points)})
+        scalars = {"arap_energy_mm2": least_energy(self.points, self.system.cells)}
+        return replace(super().frame(number), scalars=scalars)
 
     def ending(self) -> Outcome:
         """Out of steps where a frame did not meet the tolerance."""
-        first, last = self.setup.frames[0], self.setup.frames[-1]
-        done = f"{last - first} frames in {self.cost['local_global_steps']:.0f} iterations"
+        done = (
+            f"{self.setup.frames[-1] - self.setup.frames[0]} frames in {self.cost['local_global_steps']:.0f} iterations"
+        )
         if missed := self.cost["frames_off_tolerance"]:
             advice = "more iterations may help; without a tolerance their number is the method"
             return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
@@ -189,18 +165,18 @@ class Alternation:
 
 def solve(setup: Setup, settings: ArapSettings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
-    return alternate(partial(_alternation, settings), setup, sink)
+    return alternate(_alternation, setup, settings, sink)
 
 
-def _alternation(settings: ArapSettings, setup: Setup) -> Alternation:
-    system = GlobalStep.of(VertexCells.of(setup.surface, settings.weights), setup.attached_vertices, settings.fixed)
+def _alternation(setup: Setup, settings: ArapSettings) -> Alternation:
+    system = GlobalStep.of(cells_of(setup.surface, settings.weights), setup.attached_vertices, settings.fixed)
     triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
 
     def relax(points: Floats) -> Relaxed:
-        rotations = system.cells.rotations(points)
+        rotations = fit_rotations(points, system.cells)
         for count in range(1, settings.iterations + 1):
             if count > 1 and settings.rotations == "each":
-                rotations = system.cells.rotations(points)
+                rotations = fit_rotations(points, system.cells)
             moved = system.place(points, rotations)
             if settings.volume_step:
                 moved = scaled(moved, triangles, system.free, volume)
@@ -212,9 +188,9 @@ def _alternation(settings: ArapSettings, setup: Setup) -> Alternation:
     return Alternation(setup, system, relax)
 
 
-def alternate(make: Callable[[Setup], Alternation], setup: Setup, sink: Sink) -> Outcome:
+def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, settings: S, sink: Sink) -> Outcome:
     """Move the attached vertices and relax the others, frame number by frame number."""
-    model = timed(make, setup)
+    model = timed(make, setup, settings)
     if len(loose := model.system.loose):
         why = f"vertex {loose[0]}: nothing but triangles without area or weight ties it to an attached vertex"
         hint = "kirchhoff weights feel no areas"
@@ -225,7 +201,8 @@ def alternate(make: Callable[[Setup], Alternation], setup: Setup, sink: Sink) ->
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached where all are free: as attached ones stay, some of it is missing. What encloses
+        V0 is ``volume`` [mm3]. It is reached where all are free; as attached vertices stay, some of it is missing. A surface that
+        encloses
     nothing stays as it is.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
@@ -272,9 +249,9 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
     return matrix
 
 
-def _untied(laplacian: Any, attached: Ints) -> Ints:
+def _untied(matrix: Any, attached: Ints) -> Ints:
     """The vertices that no chain of edges of a weight other than 0 leads to an attached one; none where nothing is attached."""
-    part = connected_components(laplacian != 0, directed=False)[1]
+    part = connected_components(matrix != 0, directed=False)[1]
     return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)
 
 

@@ -1,11 +1,10 @@
 """The local step, the right side and the energy of as-rigid-as-possible deformation, compiled. Report eq. 5.10 and 5.11.
 
-The cell of vertex i is its edges to its neighbours: ``neighbours[starts[i]:starts[i + 1]]`` with their ``weights``, which
-need not be the same from both ends. Where nothing else is said arrays are ``points`` and ``rest`` (n, 3) [mm], ``starts``
-(n + 1,), ``neighbours`` and ``weights`` (e,) and ``rotations`` (n, 3, 3), writable and C-contiguous.
+Arrays are ``points`` (n, 3) [mm] and ``rotations`` (n, 3, 3), writable and C-contiguous.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +14,17 @@ from fem_reference.solvers.compiled_kernels import compiled
 # Sweeps over a symmetric 4 x 4 matrix; it is diagonal to rounding after about five, as convergence is quadratic.
 _SWEEPS = 30
 _ROUNDING = 1e-17
+
+
+class VertexCells(NamedTuple):
+    """The edges around each vertex i at ``rest`` (n, 3) [mm]: to ``neighbours[starts[i]:starts[i + 1]]``, with their ``weights``,
+    which need not be the same from both ends; ``starts`` (n + 1,), ``neighbours`` and ``weights`` (e,).
+    """
+
+    rest: Floats
+    starts: Ints
+    neighbours: Ints
+    weights: Floats
 
 
 @compiled
@@ -77,8 +87,8 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 
 
 @compiled
-def fit_rotations(points: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> Floats:
-    """The rotation of each cell that takes its edges at ``rest`` nearest to those of ``points``, (n, 3, 3).
+def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
+    """The rotation of each cell that takes its edges at rest nearest to those of ``points``, (n, 3, 3).
 
     The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges from the vertex itself, as in Sorkine and Alexa
     2007; about the centroids of the report's text the fit would no longer minimise eq. 5.10.
@@ -87,10 +97,10 @@ def fit_rotations(points: Floats, rest: Floats, starts: Ints, neighbours: Ints, 
     covariance, matrix, vectors = np.empty((3, 3)), np.empty((4, 4)), np.empty((4, 4))
     for i in range(len(points)):
         covariance[:] = 0
-        for at in range(starts[i], starts[i + 1]):
-            j = neighbours[at]
+        for at in range(cells.starts[i], cells.starts[i + 1]):
+            j = cells.neighbours[at]
             for a in range(3):
-                edge = weights[at] * (rest[i, a] - rest[j, a])
+                edge = cells.weights[at] * (cells.rest[i, a] - cells.rest[j, a])
                 for b in range(3):
                     covariance[a, b] += edge * (points[i, b] - points[j, b])
         _rotate(covariance, matrix, vectors, rotations[i])
@@ -98,29 +108,29 @@ def fit_rotations(points: Floats, rest: Floats, starts: Ints, neighbours: Ints, 
 
 
 @compiled
-def right_side(rotations: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> Floats:
+def right_side(rotations: Floats, cells: VertexCells) -> Floats:
     """``b_i = sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)`` (n, 3) [mm]. Eq. 5.11."""
-    found = np.zeros_like(rest)
-    for i in range(len(rest)):
-        for at in range(starts[i], starts[i + 1]):
-            j = neighbours[at]
+    found = np.zeros_like(cells.rest)
+    for i in range(len(cells.rest)):
+        for at in range(cells.starts[i], cells.starts[i + 1]):
+            j = cells.neighbours[at]
             for b in range(3):
-                edge = 0.5 * weights[at] * (rest[i, b] - rest[j, b])
+                edge = 0.5 * cells.weights[at] * (cells.rest[i, b] - cells.rest[j, b])
                 for a in range(3):
                     found[i, a] += edge * (rotations[i, a, b] + rotations[j, a, b])
     return found
 
 
 @compiled
-def energy(points: Floats, rotations: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> float:
+def energy(points: Floats, rotations: Floats, cells: VertexCells) -> float:
     """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with the squares of its source."""
     found = 0.0
-    for i in range(len(rest)):
-        for at in range(starts[i], starts[i + 1]):
-            j = neighbours[at]
+    for i in range(len(cells.rest)):
+        for at in range(cells.starts[i], cells.starts[i + 1]):
+            j = cells.neighbours[at]
             for a in range(3):
                 off = points[i, a] - points[j, a]
                 for b in range(3):
-                    off -= rotations[i, a, b] * (rest[i, b] - rest[j, b])
-                found += weights[at] * off * off
+                    off -= rotations[i, a, b] * (cells.rest[i, b] - cells.rest[j, b])
+                found += cells.weights[at] * off * off
     return found

@@ -1,14 +1,13 @@
 """ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
-*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve
-``L p' = b + lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the
-positions of the iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's:
-no small change that keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths,
-volume, dihedral angles) start from the ARAP state of the frame; nothing is kept of a velocity. Where both are asked for, the
-projections come last. As in ``arap``, there is no contact.
+*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve ``L p' = b +
+lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the positions of the
+iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's: no small change that
+keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles)
+start from the ARAP state of the frame; there are no velocities. Where both are requested, the projections come last. As in
+``arap``, there is no contact.
 """
 
-from functools import partial
 from typing import Annotated, Self
 
 import numpy as np
@@ -19,7 +18,8 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, VertexCells, alternate, farthest
+from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, alternate, cells_of, farthest
+from fem_reference.solvers.arap_kernels import fit_rotations
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import PbdConstraints, Stiffness, sweep
@@ -43,7 +43,7 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
+    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
     states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off
@@ -65,11 +65,11 @@ class ArapPbdSettings(Record):
 
 def solve(setup: Setup, settings: ArapPbdSettings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
-    return alternate(partial(_alternation, settings), setup, sink)
+    return alternate(_alternation, setup, settings, sink)
 
 
-def _alternation(settings: ArapPbdSettings, setup: Setup) -> Alternation:
-    system = GlobalStep.of(VertexCells.of(setup.surface, settings.weights), setup.attached_vertices, "remove")
+def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
+    system = GlobalStep.of(cells_of(setup.surface, settings.weights), setup.attached_vertices, "remove")
     rest = PbdConstraints.at_rest(setup.surface.points, setup.surface.triangles, system.attached)
 
     def relax(points: Floats) -> Relaxed:
@@ -89,7 +89,7 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
-        moved = minimum = system.place(points, system.cells.rotations(points))
+        moved = minimum = system.place(points, fit_rotations(points, system.cells))
         if settings.volume_constraint:
             moved = at_volume(system, minimum, points, rest)
         count, met, points = count + 1, tolerance is not None and farthest(moved - points) <= tolerance, moved

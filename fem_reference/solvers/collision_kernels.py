@@ -1,10 +1,10 @@
 """Bones that keep vertices out of them, as constraints ``C = distance - allowed >= 0`` of vertices. Report section 6.1.1.
 
-A bone's distance is asked only for the vertices that it may have come near to: a distance grows and falls no faster than the
-displacement, so that a vertex which has gone less far, seen from the bone, than it was away is still outside. Vertices alone are
-asked, at the places they reach and not on their path there: a sharp edge gets between them, and what goes through a thin bone
-in one step comes out on its other side. The distance to a bone of triangles is kept on a grid along the axes at rest: with the
-whole scene turned, ``pbd`` puts the vertices of the case hip_flexion elsewhere by up to 1.2 mm, 0.1 mm on average.
+The distance to a bone is computed only for the vertices that may be near it. A distance changes by at most the displacement, so a
+vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at the
+places that they reach and not on the path there: a sharp edge may pass between them, and a vertex that goes through a thin bone in
+one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest: with the
+whole scene turned, ``pbd`` moves the vertices of the case hip_flexion by up to 1.2 mm, on average by 0.1 mm.
 """
 
 import math
@@ -27,7 +27,9 @@ Four = tuple[float, float, float, float]
 
 
 class Contacts(NamedTuple):
-    """Vertices (k,) that were asked, their value of the constraint (k,) [mm], and the unit vectors (k, 3) that raise it."""
+    """The checked vertices (k,), their values of the constraint (k,) [mm], and the unit vectors (k, 3) along which these
+    increase.
+    """
 
     vertices: Ints
     value: Floats
@@ -76,7 +78,7 @@ def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, 
 
 @compiled
 def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats) -> tuple[Floats, Floats]:
-    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), as the ``Grid`` of these coefficients says."""
+    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), by the ``Grid`` of these coefficients."""
     distance, gradient = np.full(len(points), FAR), np.zeros_like(points)
     last_x, last_y, last_z = coefficients.shape[0] - 2, coefficients.shape[1] - 2, coefficients.shape[2] - 2
     for n in range(len(points)):
@@ -116,10 +118,10 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 
 
 class CollidingBone:
-    """A bone, what it allows each vertex, and what is known of how near each has come.
+    """A bone, the distance that it allows each vertex, and the last known distances.
 
     A vertex is allowed to come within ``gap`` [mm] of the bone, and no nearer than at rest where it is nearer there: nothing
-    jumps at the first step. Vertices that are not ``free`` (n,) are never asked.
+    jumps at the first step. Vertices that are not ``free`` (n,) are never checked.
     """
 
     def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
@@ -133,7 +135,7 @@ class CollidingBone:
         self.pose = np.eye(4)
 
     def move(self, frame: float) -> None:
-        """Put the bone where it is at ``frame``."""
+        """Put the bone into its pose at ``frame``."""
         self.pose = np.array(self.bone.pose(frame), np.float64)
 
     def near(self, points: Floats) -> Contacts:
@@ -148,7 +150,7 @@ class CollidingBone:
         return Contacts(vertices, distance - allowed, away @ self.pose[:3, :3].T)
 
     def watch(self, vertices: Ints) -> None:
-        """Ask for these the next time, wherever they are."""
+        """Check these vertices the next time, wherever they are."""
         self.clear[vertices] = 0
 
     def _sample(self, places: Floats) -> tuple[Floats, Floats]:

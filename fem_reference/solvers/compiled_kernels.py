@@ -40,8 +40,8 @@ def can_keep(folder: Path) -> bool:
 def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
-    A compiled function contains those that it calls. numba looks only at a function's own file to see whether it changed,
-    hence one folder for what all of them are together.
+    A compiled function contains those that it calls. numba checks only a function's own file for changes,
+    hence one folder for each version of all loops together.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):

@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
-points it is as short as it can be. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A
-shortest path takes the shorter path round: where ends turn past what is opposite, it changes sides.
+Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest. Between two fixed
+points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A line
+goes around an obstacle on the shorter side: where its ends turn beyond opposite points, it changes sides.
 """
 
 from typing import Annotated, Self
@@ -19,7 +19,6 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.scenes.muscle import CaseSphere, Rod
 from fem_reference.solvers.common.frame_loop import each
 from fem_reference.solvers.common.hill import HillSettings
 from fem_reference.solvers.common.lines import Lines, Passed, Via, lines_of
@@ -28,38 +27,21 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
-class SphereOn(CaseSphere):
-    """A sphere, given at rest, that moves with a ``bone``."""
-
-    bone: str
-
-
-class CylinderOn(Rod):
-    """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
-
-    bone: str
-
-
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``via_count``: so many points instead, evenly
-    spread over each fibre, each on the bone of the nearer end. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight path would cross it; ``obstacle``: several.
-    ``hill``: their forces.
+    spread over each fibre, each on the bone of the nearer end. ``obstacle``: what every part of a line goes around, from one
+    fixed point to the next, where the straight path would cross it. ``hill``: their forces.
     """
 
     via: tuple[Via, ...] = ()
     via_count: Annotated[int, Field(ge=0), Trade((0, 2, 4, 8))] = 0
-    sphere: SphereOn | None = None
-    cylinder: CylinderOn | None = None
     obstacle: tuple[ObstacleOn, ...] = ()
     hill: HillSettings | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.sphere is not None) + (self.cylinder is not None) + bool(self.obstacle) > 1:
-            raise ValueError('at most one of "sphere", "cylinder", "obstacle"')
         if self.via and self.via_count:
             raise ValueError('at most one of "via", "via_count"')
         places = [via.at for via in self.via]
@@ -117,7 +99,7 @@ class Shortest:
         return self.found
 
     def ending(self) -> Outcome:
-        """Converged, as every line is; what they go through and around."""
+        """Converged, as every line is; the points and obstacles of the lines."""
         kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
         around = f" or around {self.wraps}" if self.wraps.given else ""
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
@@ -129,7 +111,7 @@ def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
-    """InputError below ``place`` where lines cannot go through and around what the settings say."""
+    """Raise InputError below ``place`` where lines cannot have the points and obstacles of the settings."""
     _made(problem, settings, place)
 
 
@@ -138,15 +120,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     obstacle at the first frame.
     """
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
-    alone = [
-        ObstacleOn(**{"bone": one.bone, name: one})
-        for name in ("sphere", "cylinder")
-        if (one := getattr(settings, name))
-    ]
-    names = [join(place, one.name) for one in alone] or [
-        join(place, f"obstacle[{i}]") for i in range(len(settings.obstacle))
-    ]
-    wraps = wraps_of(problem, (*alone, *settings.obstacle), names)
+    wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)
     if inside:
         raise InputError(join(place, name), inside, "an obstacle with all of them outside")

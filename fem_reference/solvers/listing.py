@@ -1,9 +1,9 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles) as they compute, whatever the scene and the report state.
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): what they compute, even where the report's text differs.
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
 listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: of the points of a
-mesh only the directions of its edges are felt. validation/octave has the listings as Octave runs them, their results, and the
-reading of each misprint.
+mesh only the directions of its edges count. validation/octave has the listings as Octave runs them, their results, and the reading
+of each misprint.
 """
 
 import time
@@ -32,9 +32,9 @@ class ListingSettings(Record):
 
 
 def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
-    """The listing for the problem's domain, from its mesh and what is fixed; its effects and slopes are the listing's own.
+    """The listing for the problem's domain, from its mesh and fixed values; effects and slopes are the listing's own.
 
-    What listing 4.5 draws is minus the norm of its vector unknown; that is the field here, and the vector its components.
+    Listing 4.5 draws minus the norm of its vector unknown: that is the field here, and the vector is its ``components``.
     """
     begin = time.perf_counter()
     mesh = problem.mesh
@@ -57,7 +57,7 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """InputError at ``place`` where the listing for the problem's domain has not what the case or the settings ask for."""
+    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request."""
     if problem.mesh.cells.shape[1] == 2:
         _check_ends(problem, place)
     elif settings.peclet is not None:

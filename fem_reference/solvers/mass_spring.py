@@ -1,13 +1,12 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as Table 5.1 has it: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
-sample fibres and are joined to those near them; here the mesh says which are.) They carry the surface and the fibres along.
-Springs resist neither a change of volume nor a tetrahedron that turns inside out. Attachments are exact, whatever the stiffness
-of an attachment. Contact acts on the masses of the surface: what is between those may be inside.
+A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses sample
+fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres. Springs resist
+neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact acts on
+the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math
-import time
 from itertools import combinations
 from typing import Annotated, Literal
 
@@ -22,9 +21,9 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.collision_kernels import colliding_bones, move_out
-from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, tetrahedron
+from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
@@ -53,7 +52,7 @@ class MassSpringSettings(Record):
     ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
     not depend on them, and a small one would make every time step small.
     ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
-    equilibrium; the scene's interval is the clock of what the reference and recorded sequences do in time. ``damping``: the
+    equilibrium; the scene's interval is that of the reference and of recorded sequences. ``damping``: the
     coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
     ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
     ``time_step``: the longest step wanted; without it one that is stable.
@@ -110,7 +109,7 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs going from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
+    """A muscle as masses and springs that go from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
     bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 
@@ -126,7 +125,7 @@ class MassSpringModel:
         self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
         self.points = problem.begin(mesh.points)
         self.previous = self.points.copy()
-        self.checks = surface_checks(Surface(mesh.points, skin), self.fixed)
+        self.check = SurfaceCheck(Surface(mesh.points, skin), self.fixed)
         longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(self.network, self.fixed)
         self.wanted = settings.frame_time / longest
         self.steps = max(1, math.ceil(self.wanted - 1e-9))
@@ -136,7 +135,7 @@ class MassSpringModel:
 
     @property
     def advice(self) -> str:
-        """Advice: a stable time step, else what brings the masses to rest."""
+        """Advice: a stable time step, else settings that bring the masses to rest."""
         limit = stable_time_step(self.network, self.fixed)
         if self.time_step > limit:
             return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
@@ -166,7 +165,7 @@ class MassSpringModel:
 
     def trouble(self) -> Trouble | None:
         """The trouble with the boundary of the tetrahedra; None without."""
-        return first_trouble(self.checks, self.points)
+        return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
         """Surface and fibres as the masses carry them; attached vertices are where the bones have them.
@@ -198,9 +197,8 @@ class MassSpringModel:
 
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds = _compile(settings)
-    model = MassSpringModel(problem, settings)
-    model.cost["seconds_compile"] = seconds
+    quick = settings.model_copy(update={"time_step": settings.frame_time})
+    model = timed(MassSpringModel, problem, settings, quick)
     if model.wanted > _MOST_STEPS:
         why = Trouble("out of steps", _too_many(model.wanted, settings, model.network))
         return refused(model, problem.frames[0], sink, why)
@@ -214,15 +212,6 @@ def _too_many(steps: float, settings: MassSpringSettings, network: Network) -> s
     what = f"a stiffness of {network.stiffness:.3g} N/mm and a damping of {network.damping:.3g} N s/mm"
     helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
     return f"{what} want {steps:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
-
-
-def _compile(settings: MassSpringSettings) -> float:
-    """Run every compiled function in one step of a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    first = MassSpringModel(tetrahedron(), settings.model_copy(update={"time_step": settings.frame_time}))
-    first.move(1)
-    first.frame(1)
-    return time.perf_counter() - begin
 
 
 _EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}

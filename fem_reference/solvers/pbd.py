@@ -1,15 +1,14 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
-Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
-sub-iteration is a full step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
-velocity is the displacement of a vertex in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
-the order of the vertices, as it does in the report: constraints are projected one after the other. Collisions are found anew
-in every sweep, where line 13 finds them once.
+Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every sub-iteration is a
+full step of the algorithm. No external force acts, so the time step cancels: in place of velocities the displacements of vertices
+in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the result depends on the order of
+the vertices, since constraints are projected one after the other. Collisions are found anew in every sweep; line 13 finds them
+once.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -71,7 +70,7 @@ class PbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class PbdConstraints:
-    """The constraints of a surface: what it keeps of its rest state.
+    """The constraints that keep a surface at its rest state.
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
@@ -86,6 +85,11 @@ class PbdConstraints:
     six_volumes: float
     hinges: Ints
     angles: Floats
+
+    @property
+    def count(self) -> int:
+        """The number of constraints."""
+        return len(self.edges) + len(self.hinges) + 1
 
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
@@ -118,8 +122,9 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle.
 
-    Where two segments of fibres are as near but for rounding, as at a kink, the first of them counts: turning the scene changes
-    nothing.
+        Where two segments of fibres are equally near up to rounding, as at a kink, the first of them counts, so that turning the
+        scene
+    changes nothing.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
@@ -133,32 +138,35 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
 
 def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+    return follow(timed(PbdSurface, setup, settings), setup, sink)
 
 
-def moving_surface(settings: PbdSettings, setup: Setup) -> MovingSurface:
-    """The surface of ``setup`` with its constraints."""
-    constraints = constraints_of(setup, settings)
-    bones = (
-        []
-        if settings.collision is None
-        else colliding_bones(setup.bones, setup.surface.points, setup.attached_vertices, settings.collision.gap)
-    )
+class PbdSurface(MovingSurface):
+    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and bones that it collides with."""
 
-    def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
-        carry(points, setup, frame)
-        for bone in bones:
-            bone.move(frame)
-        for _ in range(settings.sub_iterations):
-            points, displacement = advance(points, displacement, constraints, settings, bones)
-        return points, displacement
+    def __init__(self, setup: Setup, settings: PbdSettings) -> None:
+        super().__init__(setup)
+        self.settings, self.constraints = settings, constraints_of(setup, settings)
+        self.displacement, self.bones = np.zeros_like(self.points), list[CollidingBone]()
+        if settings.collision is not None:
+            places = setup.surface.points, setup.attached_vertices
+            self.bones = colliding_bones(setup.bones, *places, settings.collision.gap)
+        self.cost["projections"] = 0.0
 
-    each = len(constraints.edges) + len(constraints.hinges) + 1
-    return MovingSurface(setup, iterate, each * settings.solver_iterations * settings.sub_iterations)
+    def move(self, number: int) -> None:
+        """Run one iteration."""
+        carry(self.points, self.setup, number)
+        for bone in self.bones:
+            bone.move(number)
+        now, chosen = (self.points, self.displacement), self.settings
+        for _ in range(chosen.sub_iterations):
+            now = advance(*now, self.constraints, chosen, self.bones)
+        self.points, self.displacement = now
+        self.cost["projections"] += self.constraints.count * chosen.solver_iterations * chosen.sub_iterations
 
 
 def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
-    """The constraints of the surface at rest, with the stiffness that fibres leave to its edges."""
+    """The constraints of the surface at rest, with edges that are softer along fibres."""
     surface = setup.surface
     found = PbdConstraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:

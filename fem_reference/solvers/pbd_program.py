@@ -1,4 +1,4 @@
-"""The report's own program for position based dynamics, done again so that its recorded output is met.
+"""The report's own program for position based dynamics, reimplemented so that it reproduces the recorded output.
 
 The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
 
@@ -13,28 +13,26 @@ The program (github.com/cervenkam/muscle-deformation-PBD) departs from the repor
   line 13)
 - time: each of the steps of an iteration lasts as long as all of them should (text: section 6.1 divides it), but with no
   force it cancels
-- collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. What a flood from one
-  corner does not reach is inside. Who was inside before goes by the bone's last motion, step after step, even once the bone
-  rests; who comes inside is taken back by steps of a voxel; of two bones the later one wins. Voxels lie along
-  the axes at rest, and one voxel decides where a vertex goes: with the whole scene turned, vertices of the case hip_flexion end
-  up to 57 mm elsewhere (4.5 mm on average; without voxels 1e-8 mm)
+- collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a
+  flood from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after
+  step, even once the bone rests; one that comes inside is moved back by steps of a voxel; of two bones the later one wins. Voxels
+  lie along the axes at rest, and one voxel decides where a vertex goes: with the whole scene turned, vertices of the case
+  hip_flexion end up to 57 mm elsewhere (4.5 mm on average; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
-The recorded box is met in all 300 iterations, to the last digit of the single precision it is recorded in. That takes the
-program's own order of arithmetic, and this module therefore shares no constraint with ``pbd``: the squeezed box is chaos, where
-a difference of 1e-15 at rest, or between two orders, grows to 3 mm at iteration 100. Recorded was what gcc makes of the program
-with the flags it comes with, -Ofast among them (gcc 12 on x86-64 does it again; with -O0, -O2, -O3, -march=native or -mfma it
-leaves the recorded one by iteration 50). For the same reason a bone's pose is here the product of its motions, and the angle of
-flat pairs at rest is off by 2e-8 rad.
+The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. That requires the program's own
+order of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at
+rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the flags that come with
+it, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration
+50). For the same reason a bone's pose is here the product of its motions, and the angle of flat pairs at rest is off by 2e-8 rad.
 
-Two things are not as there: attached is what the scene says (there: all vertices in the voxels of a bone at rest), and fibres have
-the direction they have (there: it is taken from points read beside their own).
+Two things differ from the program: the scene defines the attached vertices (there: all vertices in the voxels of a bone at rest),
+and fibres have their own direction (there: one between points that are not all theirs).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -184,29 +182,34 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
 
 def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+    return follow(timed(ProgramSurface, setup, settings), setup, sink)
 
 
-def moving_surface(settings: ProgramSettings, setup: Setup) -> MovingSurface:
-    """The surface of ``setup`` with its constraints."""
-    constraints, attached = constraints_of(setup, settings), setup.attached_vertices
-    count, first = settings.voxels, setup.frames[0]
-    bones = [] if count is None else [VoxelBone(body, count, first) for body in setup.bones]
+class ProgramSurface(MovingSurface):
+    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and bones of voxels."""
 
-    def iterate(points: Floats, velocity: Floats, frame: int) -> tuple[Floats, Floats]:
-        carry(points, setup, frame)
-        for bone in bones:
-            bone.move(frame)
-        for _ in range(settings.sub_iterations):
-            goals = (1 - settings.damping) * velocity * STEP + points
-            project(goals, constraints, settings.bending)
-            reached = collided(points, goals, bones)
+    def __init__(self, setup: Setup, settings: ProgramSettings) -> None:
+        super().__init__(setup)
+        self.settings, self.constraints = settings, constraints_of(setup, settings)
+        self.velocity, self.bones = np.zeros_like(self.points), list[VoxelBone]()
+        if settings.voxels is not None:
+            self.bones = [VoxelBone(body, settings.voxels, setup.frames[0]) for body in setup.bones]
+        self.cost["projections"] = 0.0
+
+    def move(self, number: int) -> None:
+        """Run one iteration."""
+        carry(self.points, self.setup, number)
+        for bone in self.bones:
+            bone.move(number)
+        points, attached = self.points, self.setup.attached_vertices
+        for _ in range(self.settings.sub_iterations):
+            goals = (1 - self.settings.damping) * self.velocity * STEP + points
+            project(goals, self.constraints, self.settings.bending)
+            reached = collided(points, goals, self.bones)
             reached[attached] = points[attached]
-            points, velocity = reached, (reached - points) * (1 / STEP)
-        return points, velocity
-
-    sweep = len(constraints.edges) + len(constraints.hinges) + 1
-    return MovingSurface(setup, iterate, sweep * settings.sub_iterations)
+            points, self.velocity = reached, (reached - points) * (1 / STEP)
+        self.points = points
+        self.cost["projections"] += self.constraints.count * self.settings.sub_iterations
 
 
 def project(points: Floats, at: PbdConstraints, bending: float) -> None:

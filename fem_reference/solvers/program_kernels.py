@@ -1,9 +1,9 @@
 """The report's own program, compiled, in the order in which it adds up: folds are opened only, bones are voxels.
 
-All of it was read in the program's source. Next to chaos the last digit counts: each sum here has the order that gcc 12 gives
-it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2),
-as read in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: each other kind is compiled for
-anew.
+All of it follows the program's source. As the result is chaotic, the last digit counts: each sum here has the order that gcc 12
+gives it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than
+SSE2), as found in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: each other kind is compiled
+for anew.
 """
 
 import math
@@ -67,7 +67,7 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
-    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of what is missing."""
+    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of the missing volume."""
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):

@@ -8,8 +8,8 @@ The surface at rest is fitted by Gaussians, four numbers each (``geometry.gaussi
 - each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres grow thin; all radii
   are scaled together until the enclosed volume is that of rest.
 
-A vertex is carried by the Gaussians that make the surface at it, and put back to the level that it had at rest, so that the fit's
-error stays as it was. Attached vertices are exact.
+A vertex moves with the Gaussians that form the surface there, and is then moved to the level that it had at rest, so that the
+error of the fit does not change. Attached vertices are exact.
 """
 
 from dataclasses import dataclass
@@ -17,19 +17,20 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume
+from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.gaussian_surface import GaussianSurface, farthest_points, fit
 from fem_reference.problems.setup import Setup
-from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.common.frame_loop import carry, follow
+from fem_reference.runs.store import Outcome, Sink
+from fem_reference.solvers.arap import GlobalStep
+from fem_reference.solvers.arap_kernels import VertexCells, fit_rotations
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 from fem_reference.solvers.pbd_kernels import volume
 
 # Neighbours of a node, and nodes of an attachment.
@@ -51,57 +52,47 @@ class RbfSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Nodes (k, 3) that stay as rigid as possible: first the centres, then the points of attachments, which are given. ``one`` and
-    ``other`` (e,) are the ends of edges; ``factor`` is that of the matrix of the free nodes.
+    """Nodes (k, 3) that stay as rigid as possible among their neighbours in ``cells``: first the ``free`` centres, then the points
+    of attachments, which are given. ``system``: the global step.
     """
 
     nodes: Floats
     free: int
-    one: Ints
-    other: Ints
-    laplacian: Floats
-    factor: tuple[Floats, bool]
+    cells: VertexCells
+    system: GlobalStep
 
     @staticmethod
     def of(centres: Floats, given: Floats) -> "Cloud":
         """The cloud of free ``centres`` (m, 3) and ``given`` points (k - m, 3), each with its nearest neighbours."""
         nodes, free = np.concatenate([centres, given]), len(centres)
-        _, near = cKDTree(nodes).query(nodes, k=min(_AROUND + 1, len(nodes)))
-        pairs = np.stack([np.repeat(np.arange(len(nodes)), near.shape[1] - 1), near[:, 1:].ravel()])
-        one, other = np.unique(np.concatenate([pairs, pairs[::-1]], axis=1), axis=1)
-        laplacian = np.zeros((len(nodes), len(nodes)))
-        laplacian[one, other] = -1.0
-        np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
-        try:
-            factor = cho_factor(laplacian[:free, :free])
-        except np.linalg.LinAlgError as error:
-            raise InputError(
-                "gaussians", f"{free} of which some are tied to no attachment", "more, or fewer"
-            ) from error
-        return Cloud(nodes, free, one, other, laplacian, factor)
+        count = len(nodes)
+        _, near = cKDTree(nodes).query(nodes, k=min(_AROUND + 1, count))
+        near = near[:, 1:]
+        ends = np.repeat(np.arange(count), near.shape[1]), near.ravel()
+        either = csr_array((np.ones(near.size), ends), shape=(count, count))
+        either = csr_array(either + either.T)
+        starts, neighbours = either.indptr.astype(np.int64), either.indices.astype(np.int64)
+        cells = VertexCells(nodes, starts, neighbours, np.ones(len(neighbours)))
+        system = GlobalStep.of(cells, np.arange(free, count), "remove")
+        if len(system.loose):
+            raise InputError("gaussians", f"{free} of which some are tied to no attachment", "more, or fewer")
+        return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
         """Sums (k, 3, 3) of edge now times edge at rest, around each node."""
-        found = np.zeros((len(self.nodes), 3, 3))
-        before, after = (points[self.one] - points[self.other] for points in (self.nodes, now))
-        np.add.at(found, self.one, after[:, :, None] * before[:, None])
+        one, other = np.repeat(np.arange(len(now)), np.diff(self.cells.starts)), self.cells.neighbours
+        found = np.zeros((len(now), 3, 3))
+        np.add.at(found, one, (now[one] - now[other])[:, :, None] * (self.nodes[one] - self.nodes[other])[:, None])
         return found
 
     def rotations(self, now: Floats) -> Floats:
         """The rotation (k, 3, 3) around each node."""
-        u, _, v = np.linalg.svd(self.gradients(now))
-        u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
-        return u @ v
+        return fit_rotations(now, self.cells)
 
     def relax(self, now: Floats, iterations: int) -> Floats:
         """Nodes (k, 3) after local and global steps from ``now``."""
         for _ in range(iterations):
-            turn = self.rotations(now)
-            right = np.zeros_like(now)
-            edges = self.nodes[self.one] - self.nodes[self.other]
-            np.add.at(right, self.one, np.einsum("eij,ej->ei", turn[self.one] + turn[self.other], edges) / 2)
-            right = right[: self.free] - self.laplacian[: self.free, self.free :] @ now[self.free :]
-            now = np.concatenate([cho_solve(self.factor, right), now[self.free :]])
+            now = self.system.place(now, self.rotations(now))
         return now
 
     def stretch(self, now: Floats, along: Floats) -> Floats:
@@ -112,14 +103,15 @@ class Cloud:
         return np.asarray(np.linalg.norm(np.einsum("kij,kj->ki", gradients, along), axis=1))
 
 
-class RbfMuscle:
+class RbfMuscle(MovingSurface):
     """The muscle at one frame after the other."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
     def __init__(self, setup: Setup, settings: RbfSettings) -> None:
+        super().__init__(setup)
         rest, vertices = setup.surface, setup.attached_vertices
-        self.setup, self.settings, self.fitted = setup, settings, fit(rest, settings.gaussians)
+        self.settings, self.fitted = settings, fit(rest, settings.gaussians)
         self.level, _, self.shares = self.fitted.level(rest.points)
         self.handles = [
             entry.vertices[farthest_points(rest.points[entry.vertices], _HANDLES)] for entry in setup.attached
@@ -129,9 +121,9 @@ class RbfMuscle:
         self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
         self.along = _along(setup, self.cloud.nodes)
         self.volume = enclosed_volume(rest.points, rest.triangles)
-        self.points, self.nodes = setup.begin(rest.points), self.cloud.nodes
-        self.checks = surface_checks(rest, vertices)
-        self.cost: dict[str, float] = {"unknowns": 4.0 * settings.gaussians}
+        self.nodes = self.cloud.nodes
+        self.cost["unknowns"] = 4.0 * settings.gaussians
+        self.cloud.relax(self.nodes, 1)  # compiled here, not in the time of the first frame
 
     def move(self, number: int) -> None:
         """Find the muscle at a frame."""
@@ -184,14 +176,6 @@ class RbfMuscle:
         six, gradient = volume(points, self.setup.surface.triangles)
         gradient[self.setup.attached_vertices] = 0
         return gradient * (6 * self.volume - six) / float((gradient**2).sum())
-
-    def trouble(self) -> Trouble | None:
-        """The trouble with the surface; None without."""
-        return first_trouble(self.checks, self.points)
-
-    def frame(self, number: int) -> Frame:
-        """The surface."""
-        return Frame(number, self.points.copy())
 
     def ending(self) -> Outcome:
         """Converged, as every state is found by formulas."""

@@ -1,4 +1,4 @@
-"""A sequence of deformed surfaces that somebody else computed, read from their files and checked against the scene."""
+"""A sequence of deformed surfaces that another program computed, read from files and checked against the scene."""
 
 import logging
 import math
@@ -99,13 +99,13 @@ def _about_file(path: Path) -> Path:
 
 
 def origin(settings: RecordedSettings) -> dict[str, Any]:
-    """The origin of a run, as its candidate says."""
+    """The origin of a run, as its ``candidate.toml`` states it."""
     said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
     return {"candidate": said} if said else {}
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Every frame wanted, once all of them are read and known to be of this surface; the cost is what ``candidate.toml`` says.
+    """Every frame wanted, once all of them are read and known to be of this surface; the cost is that of ``candidate.toml``.
 
     The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
     """
@@ -217,7 +217,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True of those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
+    """True for those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]

@@ -4,17 +4,17 @@ Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each a
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
 stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
 
-Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is
-neither mass nor time: a frame number begins with the one before, moved by a blend of the bones, and stiffnesses are shares of an
-error, as in ``pbd``: the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's
-volume. Only rods keep their volume; the surface that they carry may not.
+Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is neither
+mass nor time: a frame number begins with the state before, moved by a blend of the bones. Stiffnesses are shares of an error, as
+in ``pbd``, so the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's volume.
+Only rods keep their volume; the surface that they carry may not.
 """
 
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy.sparse import csr_array
+from scipy.sparse import block_diag, csr_array
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -22,13 +22,11 @@ from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
-from fem_reference.solvers.common.frame_loop import carry, follow
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 from fem_reference.solvers.pbd import Stiffness
 from fem_reference.solvers.viper_kernels import (
     matrices,
@@ -62,8 +60,8 @@ class ViperSettings(Record):
 class Bundle:
     """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``, where points of a section, one of each rod, are tied to those around them.
 
-    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; a point is
-    wanted at the mean of what its groups say.
+    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; the
+    goal of a point is the mean of those of its groups.
     """
 
     def __init__(self, rest: Floats, radius: float) -> None:
@@ -93,12 +91,13 @@ class Bundle:
         return wanted.swapaxes(0, 1) + self.middle, self.radius * found[..., 12].T
 
 
-class Rods:
-    """A muscle as rods going from frame number to frame number."""
+class Rods(MovingSurface):
+    """A muscle as ``rods`` (k, p, 3) [mm] that carry its surface."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
     def __init__(self, problem: MuscleProblem, settings: ViperSettings) -> None:
+        super().__init__(problem)
         fibres, places = problem.fibres, np.linspace(0, 1, settings.points)
         lines = np.split(fibres.points, fibres.offsets[1:-1])
         rest = np.array([along(line, places.tolist()) for line in lines])
@@ -106,7 +105,7 @@ class Rods:
         inside = enclosed_volume(problem.surface.points, problem.surface.triangles)
         self.radius = float(np.sqrt(inside / np.pi / np.linalg.norm(self.steps, axis=2).sum()))
         self.bundle = Bundle(rest, self.radius)
-        self.points, self.radii = (
+        self.rods, self.radii = (
             problem.begin(rest.reshape(-1, 3)).reshape(rest.shape),
             np.full(rest.shape[:2], self.radius),
         )
@@ -114,32 +113,25 @@ class Rods:
         self.volumes = volumes(rest, self.radii)
         self.ends = [nearest_bones(problem, rest[:, end], "viper") for end in (0, -1)]
         self.last = problem.frames[0]
-        self.surface, self.fibres = (problem.begin(points) for points in (problem.surface.points, fibres.points))
+        self.fibres = problem.begin(fibres.points)
         self.of_surface = shares(problem.surface.points, rest.reshape(-1, 3), _CARRIERS)
         self.of_fibres = _along_rods(lines, settings.points)
-        self.bones, self.skin_bones = self._bones(), list[CollidingBone]()
+        self.bones, self.skin_bones = list[CollidingBone](), list[CollidingBone]()
         if settings.contact:
-            at, attached = problem.surface.points, problem.attached_vertices
-            self.skin_bones = colliding_bones(problem.bones, at, attached, 0.0)
-        self.checks = surface_checks(problem.surface, problem.attached_vertices)
+            fixed = np.arange(rest[..., 0].size).reshape(rest.shape[:2])[:, [0, -1]].ravel()
+            self.bones = colliding_bones(problem.bones, rest.reshape(-1, 3), fixed, self.radius)
+            skin = problem.surface.points, problem.attached_vertices
+            self.skin_bones = colliding_bones(problem.bones, *skin, 0.0)
         free = settings.points - 2
-        self.cost: dict[str, float] = {"unknowns": float(len(rest) * (4 * free + 3 * (free + 1) + 2))}
-
-    def _bones(self) -> list[CollidingBone]:
-        """The bones that rods stay out of."""
-        if not self.settings.contact:
-            return []
-        count, points = self.settings.points, self.rest.reshape(-1, 3)
-        ends = np.flatnonzero(np.arange(len(points)) % count % (count - 1) == 0)
-        return colliding_bones(self.problem.bones, points, ends, self.radius)
+        self.cost["unknowns"] = float(len(rest) * (4 * free + 3 * (free + 1) + 2))
 
     def move(self, number: int) -> None:
-        """Find the rods at a frame, and what they carry."""
+        """Find the rods at a frame, and the surface and fibres that follow them."""
         self._begin(number)
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)
         for _ in range(self.settings.iterations):
-            if np.isfinite(self.points).all() and np.isfinite(self.radii).all():
+            if np.isfinite(self.rods).all() and np.isfinite(self.radii).all():
                 self._sweep()
         self._carry(number)
 
@@ -147,35 +139,33 @@ class Rods:
         """Move rods as a blend of the bones at their ends, which are at their bones."""
         share, between = (np.linspace(0, 1, self.settings.points + i)[:, None] for i in (0, 1))
         first, last = (self._moved(ends, number) for ends in self.ends)
-        self.points = (1 - share) * first[0] + share * last[0]
+        self.rods = (1 - share) * first[0] + share * last[0]
         self.turns = unit((1 - between) * first[1] + between * last[1])
         for ends, i in zip(self.ends, (0, -1), strict=True):
-            self.points[:, i] = [apply(self._bone(n).pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
+            self.rods[:, i] = [apply(self.problem.bones[n].pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
         """Points and turns as if each rod were fixed to the bones ``ends`` (k,) of one end since the frame before ``number``."""
-        points, turns = np.empty_like(self.points), np.empty_like(self.turns)
+        points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
-            step = self._bone(n).pose(number) @ np.linalg.inv(self._bone(n).pose(self.last))
+            bone = self.problem.bones[n]
+            step = bone.pose(number) @ np.linalg.inv(bone.pose(self.last))
             quaternion = Rotation.from_matrix(step[:3, :3]).as_quat(canonical=True, scalar_first=True)
-            points[ends == n] = apply(step, self.points[ends == n].reshape(-1, 3)).reshape(-1, *points.shape[1:])
+            points[ends == n] = apply(step, self.rods[ends == n].reshape(-1, 3)).reshape(-1, *points.shape[1:])
             turns[ends == n] = product(quaternion, self.turns[ends == n])
         return points, turns
-
-    def _bone(self, index: int) -> Bone:
-        return self.problem.bones[index]
 
     def _sweep(self) -> None:
         """Project all constraints once."""
         chosen = self.settings
-        project_stretch(self.points, self.turns, self.steps, chosen.stretch)
+        project_stretch(self.rods, self.turns, self.steps, chosen.stretch)
         project_bend(self.turns, chosen.bending)
-        points, radii = self.bundle.goals(self.points, self.radii, self._frames())
-        self.points[:, 1:-1] += chosen.bundle * (points - self.points)[:, 1:-1]
+        points, radii = self.bundle.goals(self.rods, self.radii, self._frames())
+        self.rods[:, 1:-1] += chosen.bundle * (points - self.rods)[:, 1:-1]
         self.radii += chosen.bundle * (radii - self.radii)
-        project_volume(self.points, self.radii, self.volumes, chosen.volume)
-        flat = self.points.reshape(-1, 3)
+        project_volume(self.rods, self.radii, self.volumes, chosen.volume)
+        flat = self.rods.reshape(-1, 3)
         move_out(flat, self.bones, 1.0)
 
     def _frames(self) -> Floats:
@@ -187,22 +177,18 @@ class Rods:
     def _carry(self, number: int) -> None:
         """Move surface and fibres with the rods, each point of which turns and scales what is around it."""
         maps = (self.radii / self.radius)[..., None, None] * self._frames()
-        shifts = self.points - np.einsum("kpij,kpj->kpi", maps, self.rest)
+        shifts = self.rods - np.einsum("kpij,kpj->kpi", maps, self.rest)
         parts = np.concatenate([maps.reshape(-1, 9), shifts.reshape(-1, 3)], axis=1)
-        self.surface = _carried(self.problem.surface.points, self.of_surface @ parts)
+        self.points = _carried(self.problem.surface.points, self.of_surface @ parts)
         self.fibres = _carried(self.problem.fibres.points, self.of_fibres @ parts)
-        carry(self.surface, self.problem, number)
-        move_out(self.surface, self.skin_bones, 1.0)
-
-    def trouble(self) -> Trouble | None:
-        """The trouble with the surface; None without."""
-        return first_trouble(self.checks, self.surface)
+        carry(self.points, self.problem, number)
+        move_out(self.points, self.skin_bones, 1.0)
 
     def frame(self, number: int) -> Frame:
         """Surface and fibres; scalars: the volume of the rods over that at rest, the least and the greatest of the segments."""
-        ratio = volumes(self.points, self.radii) / self.volumes
+        ratio = volumes(self.rods, self.radii) / self.volumes
         scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
-        return Frame(number, self.surface.copy(), self.fibres.copy(), scalars=scalars)
+        return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
 
     def ending(self) -> Outcome:
         """Converged: every iteration counts as such."""
@@ -224,18 +210,12 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
 
 def _along_rods(lines: list[Floats], count: int) -> csr_array:
     """The shares (n, k * count) of points of rods in the points of ``lines``: of the two ends of the segment that each is on."""
-    rows, columns, weights, done = list[Ints](), list[Ints](), list[Floats](), 0
-    for rod, line in enumerate(lines):
+    shares_of = []
+    for line in lines:
         travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        at = travelled / travelled[-1] * (count - 1)
-        low = np.minimum(at.astype(np.int64), count - 2)
-        rows += 2 * [done + np.arange(len(line))]
-        columns += [rod * count + low, rod * count + low + 1]
-        weights += [1 - (at - low), at - low]
-        done += len(line)
-    parts = (np.concatenate(part) for part in (weights, rows, columns))
-    values, row, column = parts
-    return csr_array((values, (row, column)), shape=(done, len(lines) * count))
+        places, ends = travelled / travelled[-1] * (count - 1), np.arange(count)
+        shares_of.append(csr_array(np.column_stack([np.interp(places, ends, hat) for hat in np.eye(count)])))
+    return csr_array(block_diag(shares_of))
 
 
 def _carried(rest: Floats, parts: Floats) -> Floats:

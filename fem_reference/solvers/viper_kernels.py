@@ -3,8 +3,8 @@
 Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p + 1, 4), unit quaternions (w, x, y, z)
 that take each segment's frame from rest, between those of the two bones. Bones give the ends' points, all others are free.
 
-All constraints of a kind are projected at once, after Jacobi, each by no more than keeps the sum of its neighbours' steps from
-overshooting. Where constraints contradict each other the limit is the least sum of squares, whatever the order of points.
+All constraints of a kind are projected at once (Jacobi), each by a share that keeps the sum with its neighbours' steps from
+overshooting. Where constraints contradict each other the limit is the least sum of squares, for any order of points.
 """
 
 import numpy as np
@@ -85,7 +85,7 @@ def volumes(points: Floats, radii: Floats) -> Floats:
 def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float) -> None:
     """Project ``C = V / V_0 - 1`` of each segment, whose volumes at ``rest`` are (k, p - 1) [mm3], by radii and points.
 
-    Each moves by the mean of what its two segments want; a radius at an end has one segment.
+    Each moves by the mean of the steps of its two segments; a radius at an end has one segment.
     """
     steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest

@@ -1,4 +1,4 @@
-"""Arguments of the calls that the package offers to Python: refused by name before anything is done."""
+"""Checks of arguments of the Python API: an unusable one is refused by name before anything is done."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,7 +26,7 @@ def check_case(case: object) -> Case:
 
 
 def is_of_body(reference: object, of: object) -> bool:
-    """True of a run of a body; InputError where that is another than the one it is said to be ``of``."""
+    """True for a run of a body; InputError where it is of another body than ``of``."""
     if not isinstance(reference, Run) or reference.body is None:
         return False
     if reference.body is not of:
@@ -35,14 +35,14 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_changes(changes: object) -> None:
-    """InputError unless it is keys and values, or None."""
+    """Raise InputError unless they are keys and values, or None."""
     keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)
     if not all(isinstance(key, str) for key in keys):
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
 
 
 def check_solver(solver: object, settings: Mapping[str, object]) -> None:
-    """InputError unless ``solver`` is a name, and there where there are ``settings`` of it."""
+    """Raise InputError unless ``solver`` is a name, or None without ``settings``."""
     if solver is not None and not isinstance(solver, str):
         raise InputError("solver", said(solver), "the name of a solver, or None")
     if solver is None and settings:
@@ -51,7 +51,7 @@ def check_solver(solver: object, settings: Mapping[str, object]) -> None:
 
 
 def free_folder(given: object, place: str) -> Path:
-    """The path of a folder that is there or can be made."""
+    """The path of a folder that exists or can be made."""
     folder = path(given, place)
     above = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     if not above.is_dir():
@@ -65,7 +65,7 @@ def check_comparison(comparison: object) -> Comparison:
 
 
 def check_error_bars(bars: object, case: Case) -> None:
-    """InputError unless they are error bars of a reference of the ``case``, or None."""
+    """Raise InputError unless they are error bars of a reference of the ``case``, or None."""
     if bars is None:
         return
     known = check(bars, ErrorBars, "error_bars", "ErrorBars, such as error_bars returns, or None")
@@ -75,7 +75,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """InputError unless it is a run of the ``case``, as far as it says of which."""
+    """Raise InputError unless it is a run of the ``case``, as far as it names its case."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}
@@ -92,7 +92,7 @@ def check_run(given: object, case: Case, place: str) -> None:
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:
-    """InputError where runs cannot be compared: they are of another case, two of one name, or have other vertices."""
+    """Raise InputError where runs cannot be compared: they are of another case, two have the same name, or the vertices differ."""
     check_run(reference, case, "reference")
     if not isinstance(candidates, Sequence) or isinstance(candidates, str | bytes):
         raise InputError("candidates", said(candidates), "a list of runs")

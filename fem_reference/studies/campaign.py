@@ -1,7 +1,7 @@
 """Many runs at once: on processes of this machine, or on the workers of a Dask cluster; each run goes into the store.
 
-A worker that dies takes nothing with it but what it was solving: that is solved again, by another worker. What is in the store is
-not solved again, so that a campaign that was cut off goes on where it was.
+If a worker dies, only the run that it was solving is lost; another worker solves it again. Stored runs are not solved again, so an
+interrupted campaign continues where it stopped.
 """
 
 import logging
@@ -94,7 +94,7 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
 
 
 def solve(trial: Trial, store: Path) -> Run:
-    """The run of a trial, in this process; one that failed before is not tried again, where it would fail again."""
+    """The run of a trial, in this process; one that failed before, and would fail again, is not repeated."""
     bench = shared_bench(trial.scene, store)
     folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:

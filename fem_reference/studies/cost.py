@@ -9,7 +9,7 @@ import numpy as np
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
-from fem_reference.assessment.cost_study import CaseStudy, Study, load_all
+from fem_reference.assessment.cost_study import CaseStudy, Study, load
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
@@ -45,7 +45,7 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
 
 def stored(folder: Path) -> list[CaseStudy]:
     """The studies below ``folder``, of a case that of its own name before those with another; InputError where there is none."""
-    known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load_all(path)]
+    known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
     found = {study.case: study for study, name in sorted(known, key=lambda one: one[0].case == one[1])}
     if not found:
         want = "a folder with studies: fem-reference study CASE makes one"
@@ -107,7 +107,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial without those that are their solver's own anyway: a case may name them, and another not."""
+    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)

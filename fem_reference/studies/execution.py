@@ -1,8 +1,6 @@
 """A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
 import logging
-import os
-import platform
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -20,7 +18,7 @@ from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import Watch
 from fem_reference.runs import store
-from fem_reference.runs.key import code_hash, key, versions
+from fem_reference.runs.key import code_hash, key, machine, versions
 from fem_reference.runs.store import Frame, Run, collected
 from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
@@ -106,7 +104,7 @@ class Bench[C: Case]:
                 offer.check_problem(own, self.given(offer, own), join(self.scene.place, place))
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
+        """The run of a solver of this package, by its name on pages; ``place`` is where the scene chooses it."""
         run = self._run(name, choice, place, self._made)
         assert run is not None  # what is not stored is made
         return run
@@ -191,11 +189,11 @@ class Bench[C: Case]:
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
-        """The thing that a solver is given: the problem, or the setup of a muscle that it does not need filled."""
+        """The input of a solver: the problem, or for a solver without tetrahedra the set-up of the muscle."""
         return self._problem() if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
+        """A recorded run, checked against the set-up of the scene; it is read each time and not stored."""
         wanted, frames = self.settings(choice, place), list[Frame]()
         assert isinstance(wanted, recorded.RecordedSettings)
         outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
@@ -204,7 +202,7 @@ class Bench[C: Case]:
         return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
-        """The folder in which the run of a solver of our own is stored, once there is one."""
+        """The folder of the stored run of a solver of this package, which exists once the run is made."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def key(self, solver: str, settings: Record) -> str:
@@ -225,5 +223,5 @@ class Bench[C: Case]:
             "fem_reference": __version__,
             "code": code_hash(solver),
             "versions": versions(),
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "machine": machine(),
         }

@@ -1,4 +1,4 @@
-"""Runs of a case -> a comparison, whatever was solved; of a scalar case with the convergence of its reference."""
+"""Comparisons made of runs of a case of any kind; for a scalar case with the convergence of its reference."""
 
 import logging
 import math

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class StoppedError(Exception):
-    """A run that goes on with other effects, and why."""
+    """A run that has to continue with other effects; the reason."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Wanted:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Make the run in ``folder`` alone: a second process waits, and then finds it made."""
+    """A context in which only this process makes the run in ``folder``: a second process waits, and then finds it made."""
     files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:

@@ -60,7 +60,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
     moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones.
-    InputError names the file that cannot be used, or what cannot be guessed.
+    InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more: a muscle goes from one to another")
@@ -80,7 +80,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
 
 def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
-    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; no name is too odd for that."""
+    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; names may be any text."""
     around, paths = dict[str, Surface](), {"muscle": "muscle.ply"}
     for name, surface in bones.items():
         clean = _distinct(name if is_name(name) else _cleaned(name), {"muscle", *around})
@@ -95,7 +95,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """True where a scene can call something so."""
+    """True where a scene file can use it as a name."""
     try:
         return bool(check_name(name))
     except ValueError:

@@ -65,7 +65,7 @@ def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
 
 
 def is_material(effect: Effect) -> bool:
-    """True of the material itself, which cannot be left out: an isotropic energy that is stored and always acts."""
+    """True for the material itself, which cannot be left out: an isotropic energy that is stored and always acts."""
     return isinstance(effect, Energy) and effect.stored and not effect.needs and not isinstance(effect, Ramped)
 
 

@@ -1,4 +1,4 @@
-"""Runs that error bars are made of: on coarser tetrahedra, and on these with every other cause of numerical error halved."""
+"""Runs for error bars: on coarser tetrahedra, and on these with each other cause of numerical error halved."""
 
 import hashlib
 import logging
@@ -75,7 +75,7 @@ def half_steps(case: MuscleCase, settings: Record) -> Vary:
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
-    With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
+    With ``model``, also the change by exact attachments. None for a run that did not converge, and for one without an interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("error bar: none, of a reference that did not converge or has no interior")

@@ -113,7 +113,7 @@ def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -
 
 
 def stated(record: Record) -> int:
-    """The values of a ``record`` that are required or are none of its defaults; those inside its records one by one."""
+    """The values of a ``record`` that are required or differ from its defaults; those of inner records one by one."""
     fields = type(record).model_fields.items()
     given = [(field, getattr(record, key)) for key, field in fields]
     return sum(_leaves(value) for field, value in given if field.is_required() or value != field.default)

@@ -26,7 +26,7 @@ CASES = (
 
 
 def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
-    """The claims of the references of ``scenes``, with runs in ``store``: solved where that was not done before."""
+    """The claims of the references of ``scenes``, with runs in ``store``, solved where they are missing."""
     named = {scene.name: scene for scene in scenes}
     found, missing = each(named, partial(_of, store=store))
     why = "its reference, or the finer solution, did not reach all frames"

@@ -55,12 +55,13 @@ def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:
-    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
+    """The ``choice`` of a run that is only measured: the reference stores no states."""
     return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
+    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by a hash of their
+    contents.
 
     A vertex is attached where the nearest of the original surface is.
     """
@@ -90,7 +91,7 @@ def nearest_vertices(surface: Surface, points: Floats) -> Floats:
 
 
 def carried(run: Run, surface: Surface) -> Run:
-    """A ``run`` on another surface, carried to ``surface``, whose vertices follow by the extension that fibres follow by."""
+    """A ``run`` on another surface, carried to the vertices of ``surface`` by the same extension as to fibres."""
     if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
         return run
     extension = Extension.to(surface.points, run.surface)
@@ -100,7 +101,7 @@ def carried(run: Run, surface: Surface) -> Run:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run to be made: of a ``scene`` by ``choice``, called ``name``; what was varied (``knob``) to what (``value``), and the
+    """A run to be made: of a ``scene`` by ``choice``, called ``name``; the varied key (``knob``) and its ``value``, and the
     scene's keys that were ``changed``, as scene files write them.
     """
 
@@ -134,9 +135,8 @@ def reference_trials(case: MuscleCase) -> Iterator[Trial]:
 
 
 def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
-    """The candidates of a case, and those that Table 5.1 has on every scene: as they are, with each setting varied that
-    their solver says trades accuracy for time, and on other meshes; ``surfaces``: by what they are called, the case on
-    other triangles.
+    """The candidates of a case, and those of Table 5.1 for every scene: with their own settings, with each setting varied that
+    trades accuracy for time, and on other meshes; ``surfaces``: by name, the case on other triangles.
     """
     known = list[dict[str, Any]]()
     for candidate in (*case.candidate, *solvers.in_table()):
@@ -174,7 +174,7 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
-    """A trial with each setting of its solver at each step of its ladder but its own and those that its other settings exclude."""
+    """A trial for each value on the ladder of each setting, except its own value and those that its other settings exclude."""
     own = solvers.settings(base.choice, base.name)
     for key, values in solvers.trades(type(own)).items():
         for value in values:
@@ -216,7 +216,7 @@ def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
 
 
 def _contact(base: Trial) -> Iterator[Trial]:
-    """Contact stiffer and softer, the distances to bones known better and less well; nothing where there is no contact."""
+    """Trials with stiffer and softer contact, and with more and less exact distances to bones; none without contact."""
     scene = base.scene
     contact = among(scene.effects)
     if contact is None:

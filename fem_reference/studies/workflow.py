@@ -1,4 +1,4 @@
-"""The steps from a case to a page, one call each: what the package offers to Python."""
+"""The steps from a case to a page, one call each: the Python API."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -54,7 +54,7 @@ def solve(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
-    """Solve a case, or take up what was solved before: a run is stored by all that determines it.
+    """Solve a case, or read its stored run: runs are stored under all that determines them.
 
     Parameters
     ----------
@@ -130,15 +130,15 @@ def error_bars(
 def error_bars(
     case: Case | Body, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | BodyBars | None:
-    """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact;
-    or how far a body may be from it on cells of its shape, from a solution on smaller cells or with more unknowns in each.
+    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact;
+    or that of a body on cells of its shape, from a solution on smaller cells or with more unknowns in each.
 
     Parameters
     ----------
     case
         The case of the reference, or the body.
     reference
-        What :func:`solve` returned without a ``solver``, or what :func:`solve_body` returned.
+        The result of :func:`solve` without a ``solver``, or of :func:`solve_body`.
     store
         The folder that runs are stored in; bars are kept beside the reference's run. Those of a body are not stored.
     progress
@@ -163,7 +163,7 @@ def error_bars(
 def compare(
     case: Case, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure candidates against the reference of a case, and judge what the case expects.
+    """Measure candidates against the reference of a case, and judge its expectations.
 
     Parameters
     ----------
@@ -254,8 +254,8 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     Parameters
     ----------
     body
-        Cells, effects, what is prescribed where, and the frames that are wanted. What is prescribed may be a function of the
-        caller's own.
+        Cells, effects, prescribed displacements of regions, and the requested frames. A prescribed displacement may be a
+        function of the caller's own.
     progress
         Called with each line of progress.
     settings
@@ -264,8 +264,8 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     Returns
     -------
     Run
-        ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of what is prescribed; the
-        ``outcome``. How far they are from the truth on cells of this size, :func:`error_bars` says.
+        ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement;
+        the ``outcome``. :func:`error_bars` estimates the error of cells of this size.
 
     """
     with reported(progress):

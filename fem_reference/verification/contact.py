@@ -1,4 +1,4 @@
-"""Contact of bodies with rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
+"""Contact of bodies with rigid ones: a plate on a block, and a ball on a large body (Hertz)."""
 
 from collections.abc import Callable
 from functools import partial

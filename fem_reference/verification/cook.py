@@ -1,7 +1,7 @@
 """Cook's membrane: a clamped, tapered panel in plane strain, under a shear load; nearly incompressible, bent and sheared at once.
 
-One layer of cells, both of whose faces stay in their planes. The small strain solution is found by a load so small that it is
-linear, and scaled up.
+The panel is one layer of cells, both of whose faces stay in their planes. The small strain solution comes from a load so small
+that the answer is linear, and is scaled up.
 """
 
 from dataclasses import dataclass
@@ -33,8 +33,8 @@ def _place(unit: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Panel:
-    """The membrane ``name`` of ``validation.cook`` made of an ``element``, under a ``share`` of its load; its moduli are off by the
-    factors ``shear`` and ``bulk``.
+    """The membrane ``name`` of ``validation.cook`` made of an ``element``, under a ``share`` of its load; its moduli are wrong by
+    the factors ``shear`` and ``bulk``.
     """
 
     name: str
@@ -66,7 +66,7 @@ def tip(lab: Lab, n: int, **panel: Any) -> float:
 
 
 def ratio(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement of the corner over what it should be."""
+    """The displacement of the corner over its true value."""
     return tip(lab, n, **panel) / float(getattr(cook, panel["name"]).tip)
 
 

@@ -51,8 +51,8 @@ def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: i
 
 
 def frequency(lab: Lab, steps: int, factor: float) -> float:
-    """The frequency of the first mode of a bar [rad/s] under a small weight along it, in so many steps a period, over two of them:
-    of any cosine of n steps about a mean, q, ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, c the cosine of what one step turns.
+    """The frequency of the first mode of a bar [rad/s] under a small weight along it, by ``steps`` a period over two periods: a
+    cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, with c the cosine of the phase of one step.
     """
     acting = mass(factor), weight(0, 1e-4 * MODULUS / DENSITY / LENGTH)
     solved = lab.solve(bar(acting, (), 2 * steps, 2 * PERIOD), "P2", **STEP, residual=1e-14)
@@ -67,7 +67,7 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
     """The change of elastic, kinetic and potential energy together over the greatest kinetic energy, of a block clamped at one side
-    that its own weight bends, at once: it swings.
+    that swings under its own weight, applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -89,7 +89,7 @@ PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FR
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
-    """The force [N] that inertia adds at a quarter of a pull of so many ``periods`` of the first mode, of 1e-4 of the length."""
+    """The force [N] of inertia after a quarter of a pull by 1e-4 of the length in so many ``periods`` of the first mode."""
     forces = []
     for acting in ((), (mass(factor),)):
         body = bar(acting, (Prescribed("x1", "x1", (0,), PULL),), FRAMES, periods * PERIOD)
@@ -98,7 +98,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The force of inertia over what it is in the limit, by pulls that take twice as long: it is of order 2 in the speed."""
+    """The force of inertia over its limit for slow motion, by pulls that take twice as long: it is of order 2 in the speed."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)

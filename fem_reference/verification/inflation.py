@@ -1,7 +1,7 @@
 """Hollow bodies that are blown up: a sphere, past the point where its pressure is largest, and a tube.
 
-Where the inner face is moved, the pressure is the slope of the body's energy over the enclosed volume: the work of the pressure is
-what the energy grows by. The energy is a polynomial through those of a few stretches of the inner face.
+Where the inner face is moved, the pressure is the slope of the body's energy over the enclosed volume: the energy grows by the
+work of the pressure. The energy is a polynomial through the values at a few stretches of the inner face.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ Reading = tuple[float, Callable[[Pressures], float]]
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """Stretches from 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
+    """Stretches from 1 to the largest, closer at both ends, so that a polynomial through values there is accurate in between."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 

@@ -20,7 +20,7 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` by the reference, FEniCSx; none may take for ever."""
+        """The states of ``body`` by the reference, FEniCSx, within a time limit."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
         return second_check.confirmed_body(body, solved)

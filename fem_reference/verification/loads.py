@@ -42,7 +42,7 @@ def weight(density: float, times: float = 1.0) -> Effect:
 
 
 def pressed(pressure: float) -> Effect:
-    """A fluid of ``pressure`` [MPa] on what is wet."""
+    """A fluid of ``pressure`` [MPa] on the region "wet"."""
     return make("pressure", on="wet", pressure=f"{pressure} MPa", ramp=ramp())
 
 
@@ -71,14 +71,14 @@ def loaded(
 
 
 def reaction(lab: Lab, density: float) -> float:
-    """The force on the base of a block that stands, stuck to it [N]."""
+    """The force [N] on the base to which a standing block is glued."""
     mesh = shapes.box((3, 2, 2), LARGE, "tetrahedron")
     body = Body(mesh, (*neo_hooke(MU, BULK), weight(density)), clamped("z0"), (0, 1))
     return float(lab.solve(body, "P2/P1", first_step=0.25, residual=1e-10).last.forces["z0"][2])
 
 
 def top(lab: Lab, cells: int, element: str) -> float:
-    """The displacement of the top of the column [mm], by a number of cells one above the other."""
+    """The displacement of the top of the column [mm], with a number of cells along its height."""
     mesh = shapes.box((1, 1, cells), (2.0, 2.0, HEIGHT), ELEMENTS[element][0])
     acting = (*neo_hooke(MU, SOFT, element), weight(MUSCLE, WEIGHT / (MUSCLE * FREE_FALL)))
     body = Body(mesh, acting, sliding("x0", "x1", "y0", "y1", "z0"), (0, 1))

@@ -1,4 +1,4 @@
-"""Patch tests: linear functions and turns of any size, which every element must represent whatever the shape of its cells."""
+"""Patch tests: linear functions and turns of any size, which every element must represent exactly on cells of any shape."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def patch(element: str, degree: int, share: float = 1.0) -> Body:
 
 
 def patch_error(lab: Lab, element: str, degree: int, share: float = 1.0) -> float:
-    """The largest distance of a node from where the whole gradient takes it [mm]."""
+    """The largest distance [mm] of a node from its place under the whole gradient."""
     body = patch(element, degree, share)
     points = lab.solve(body, element, first_step=0.5, residual=1e-13).last.points
     return farthest(points, body.mesh.points @ (np.eye(3) + np.array(GRADIENT)).T)
@@ -53,7 +53,7 @@ def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], f
 
 
 def turned_error(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float = 1.0) -> float:
-    """The largest distance of a node from where the turn takes it [mm]."""
+    """The largest distance [mm] of a node from its place after the turn."""
     before, after = states(lab, material, element, faces, further)
     return farthest(after.points, before.points + turn(1.0)(before.points, 2))
 

@@ -1,8 +1,8 @@
-"""The rim of a clamped area, where displacement goes with the root of the distance: at which order the error falls.
+"""The rim of a clamped area, where displacement varies as the square root of the distance: the order at which the error falls.
 
 Half of the bottom of a block is clamped, so that a clamped face and a free one meet at 180 degrees. The side beyond the free half
-is pulled along the bottom, by a load so small that strains are about a hundredth; the opposite side slides on a plane, so that its
-corner with the clamped half is no rim.
+is pulled along the bottom, by a load so small that strains are about a hundredth. The opposite side slides on a plane, so that its
+corner with the clamped half is not singular.
 """
 
 from functools import partial

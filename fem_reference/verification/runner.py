@@ -45,7 +45,7 @@ def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
 
 
 def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
-    """The names of the entries that ``wanted`` means, in the order of the catalogue: names of entries or groups, or shell
+    """The names of the ``wanted`` entries, in the order of the catalogue: names of entries or groups, or shell
     patterns of them. InputError naming ``place`` where one means none.
     """
     chosen: set[str] = set()

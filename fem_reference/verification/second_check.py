@@ -1,4 +1,4 @@
-"""The second check of runs that a solver calls converged: a true run passes, and each of what may be wrong with one denies it."""
+"""The second check of runs that a solver calls converged: a correct run passes, and each kind of mistake denies it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -65,14 +65,14 @@ def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
 
 
 def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
-    """The number of checks that are not met by the run, or by one with a mistake made on purpose."""
+    """The number of checks that are not met by the run, or by one with a deliberate mistake."""
     problem, run = solved(lab)
     lost = [str(one) for one in of_muscle(*(mistake(problem, run) if mistake else (problem, run))) if not one.met]
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
 def swapped(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """Two frames in each other's place."""
+    """Two frames exchanged."""
     return problem, replace(run, positions=run.positions[[0, 2, 1]])
 
 

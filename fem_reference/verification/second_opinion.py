@@ -1,8 +1,8 @@
-"""The same bodies by other solvers: by scikit-fem, and by each linear solver of FEniCSx, which changes the time and not the answer.
+"""The same bodies by other solvers: by scikit-fem, and by each linear solver of FEniCSx, which must not change the answer.
 
 FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Both discretise alike, so that their states differ
-by Newton's residual and, where a rule cannot integrate an energy exactly, by their rules: Gauss-Legendre in hexahedra for both, but
-other points in tetrahedra, where a higher degree brings them together.
+by Newton's residual and, where a rule cannot integrate an energy exactly, by their rules: Gauss-Legendre in hexahedra for both,
+but other points in tetrahedra, where a higher degree brings them together.
 """
 
 from collections.abc import Callable
@@ -102,7 +102,7 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
-    """The largest distance of a node from where it is by the direct solver in double precision [mm]."""
+    """The largest distance [mm] of a node from its place by the direct solver in double precision."""
     return farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 

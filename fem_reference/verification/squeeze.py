@@ -2,14 +2,14 @@
 corners fold over.
 
 Smooth plates leave every state homogeneous, also below half the height, where it is unstable: Newton's method follows it, as
-nothing on a structured mesh disturbs it. On the return path a load step that is too large finds another state at rest: the block
-turned by half a turn, through its planes of symmetry. It is not taken, as det F falls to 0 on the straight way there.
+nothing on a structured mesh disturbs it. On the return path a load step that is too large finds another state without stress: the
+block turned by half a turn, through its planes of symmetry. That state is refused, as det F falls to 0 on the straight line to it.
 
 Where the bulk modulus is low, no state near the rest volume is left at some height. An isochoric neo-Hookean energy pulls at the
 volume, which the law ``K/2 (J - 1)^2`` cannot keep: its pressure is K at most. Free at its sides the block is in balance where
 ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. But for ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
-right side is 0.326 K at most, at J = 2/5: below a stretch of some mu/K the only state left is one near ``J = stretch^3``, a block
-that has shrunk alike along all axes, without shear and without force on the plate.
+right side is 0.326 K at most, at J = 2/5. Below a stretch of some mu/K the only state left is near ``J = stretch^3``: a block that
+has shrunk equally along all axes, without shear and without force on the plate.
 """
 
 from functools import partial
@@ -47,8 +47,8 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of the block there and as much of the way ``back``: at even steps, or where they are ``growing`` at the ends of
-    both paths.
+    """All states of the block on the path down and on a share ``back`` of the return: at even steps, or where they are
+    ``growing`` at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
     # Every state by Newton's method, those of the return path too.
@@ -77,7 +77,7 @@ def volume(lab: Lab, element: str, bulk: float) -> Finding:
 
 
 def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool, back: float = 1.0) -> Finding:
-    """The largest distance of a node from rest [mm] when the plate is as much of the way ``back``."""
+    """The largest distance [mm] of a node from rest when the plate is at the share ``back`` of its return."""
     states = smooth(lab, element, bulk, growing=growing, back=back)
     return _finding(farthest(states[-1].points, states[0].points), states)
 
@@ -141,7 +141,7 @@ def inverts(lab: Lab, element: str, count: int, height: float) -> Finding:
 
 
 def stays_upright(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Finding:
-    """1 where the squeeze ends with det F above zero at every point looked at, else 0."""
+    """1 where the squeeze ends with det F above zero at every checked point, else 0."""
     solved = glued(lab, element, count, height, **settings)
     scalars = solved.states[-1].scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])

@@ -9,7 +9,7 @@ from balls import NUMBERS, SCENE, SHIFTS, asked, bars, checked, current, edited
 
 from fem_reference import metrics
 from fem_reference.assessment import baseline
-from fem_reference.assessment.baseline import Limits
+from fem_reference.assessment.baseline import limits
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
 
@@ -73,15 +73,15 @@ def test_an_update_keeps_what_was_edited_so_that_accuracy_cannot_be_lost_in_smal
 def test_limits_of_a_new_baseline() -> None:
     one = Measure("volume", "deviation", "%", np.array([0.0, -20.0, 5.0]))
     # The bar where it is less than 2 % of 20; the greatest of value and bar.
-    assert Limits.of(one, np.array([0.0, 0.1, 0.3])) == (0.3, 20.2)
+    assert limits(one, np.array([0.0, 0.1, 0.3])) == (0.3, 20.2)
     # 2 % of 20 where it is less than the bar.
-    assert Limits.of(one, np.array([0.0, 0.1, 9.0])) == (0.4, 20.2)
-    assert Limits.of(one, np.full(3, np.nan)) == (0.4, None)
+    assert limits(one, np.array([0.0, 0.1, 9.0])) == (0.4, 20.2)
+    assert limits(one, np.full(3, np.nan)) == (0.4, None)
     # Ten of the last digit where nothing deviates and everything is known.
-    assert Limits.of(Measure("volume", "deviation", "%", np.zeros(3)), np.zeros(3)) == (0.001, 0.001)
-    assert Limits.of(Measure("volume", "deviation", "%", np.full(3, np.nan)), np.zeros(3)) == (0.001, None)
+    assert limits(Measure("volume", "deviation", "%", np.zeros(3)), np.zeros(3)) == (0.001, 0.001)
+    assert limits(Measure("volume", "deviation", "%", np.full(3, np.nan)), np.zeros(3)) == (0.001, None)
     itself = Measure("penetration", "volume", "mm3", np.array([0.0, 100, 200]))
-    assert Limits.of(itself, np.zeros(3)) == (4.0, 205.0)
+    assert limits(itself, np.zeros(3)) == (4.0, 205.0)
 
 
 def test_every_unit_has_its_digits() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fem_reference.assessment.cost_study import facts, load, load_all
+from fem_reference.assessment.cost_study import facts, load
 from fem_reference.foundations.errors import InputError
 from tests.assessment.test_recommendation import RMS, TIME, study
 
@@ -72,7 +72,7 @@ def test_a_damaged_study_is_refused_with_file_and_key(what: str, tmp_path: Path)
     damage(table)
     path.write_text(json.dumps(table).replace("Infinity", "1e999"))
     with pytest.raises(InputError) as refused:
-        load_all(path)
+        load(path)
     assert str(refused.value).startswith(f"{path}: {want}")
 
 
@@ -80,7 +80,7 @@ def test_a_file_is_read_back_whole(tmp_path: Path) -> None:
     given = replace(study("bar", 50), bars={RMS: 1.0})
     path = tmp_path / "study.json"
     path.write_text(json.dumps(facts(given, {"machine": "here"})))
-    assert vars(load(path)) == vars(given)
+    assert list(map(vars, load(path))) == [vars(given)]
     path.write_text("[]")
     with pytest.raises(InputError, match=r"got \[\], want a study as the verb study writes it"):
-        load_all(path)
+        load(path)

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_reference.assessment.differences import ratio, typical, typical_changes
+from fem_reference.assessment.differences import greatest, ratio, typical, typical_changes
 
 APART = np.array([0.0, 1.0, 2.0])
+
+
+def test_the_greatest_is_of_what_is_finite_and_of_nothing_it_is_no_number() -> None:
+    assert greatest(np.array([np.nan, -2.0, -3.0, np.inf])) == -2.0
+    assert np.isnan(greatest(np.array([np.nan, np.inf])))
 
 
 def test_a_ratio_is_of_root_mean_squares_over_the_frames_that_are_known() -> None:

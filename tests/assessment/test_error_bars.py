@@ -269,10 +269,28 @@ def test_a_file_that_was_cut_off_is_named(tmp_path) -> None:
         error_bars.load(tmp_path, OF)
 
 
+def test_a_stress_whose_difference_is_small_by_chance_is_known_as_well_as_the_others() -> None:
+    """1 and 7 kPa a frame of difference, and none by chance: of first order, 5 kPa, their root mean square, counts at least."""
+
+    def stressed(coarse: float) -> Run:
+        apart = {"von_mises_mean": 1.0, "von_mises_p95": 7.0, "pressure_mean": 0.0}
+        found = {f"stress_{name}": 0.001 * (20 + coarse * size) * TIMES for name, size in apart.items()}
+        return replace(run(0.1 + 0.01 * coarse), scalars=found)
+
+    runs = Pair(stressed(0.0), stressed(1.0), (4.0, 8.0), {})
+    found = error_bars.error_bars(runs, MeasurementContext.of(runs.fine, FIBRE, (), None))
+    pooled = np.sqrt(50 / 3)
+    for of in ("change", "deviation"):
+        for statistic, wanted in (("von_mises_mean", pooled), ("von_mises_p95", 7.0), ("pressure_mean", pooled)):
+            bar = found.find(of, "stress", statistic)
+            assert bar is not None
+            assert (bar.unit, bar.values) == ("kPa", pytest.approx(1.25 * wanted * TIMES, rel=1e-9))
+
+
 def test_forces_and_moments_have_bars_in_their_own_units() -> None:
     """100 N a frame along y at 30 mm along z from an axis along x, 10 % more on tetrahedra of twice the size: of an error a h^1.5
     the sizes differ by 1.83 a h^1.5; the force, one number at one place, is taken to be of first order, and a fifth less certain.
-    Without forces there is no bar.
+    The arm is 30 mm on both, and unknown at rest. Without forces there is no bar.
     """
     motion = RigidMotion((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2))
     bone = Bone("femur", REST, motion)
@@ -292,5 +310,9 @@ def test_forces_and_moments_have_bars_in_their_own_units() -> None:
             bar = found.find(of, "joint_moment", statistic)
             assert bar is not None
             assert (bar.unit, bar.values) == (unit, pytest.approx(1.25 * wanted * TIMES, abs=1e-9))
+        arm = found.find(of, "joint_moment", "arm")
+        assert arm is not None
+        assert arm.values == pytest.approx([np.nan, 0, 0], abs=1e-12, nan_ok=True)
+        assert arm.parts == {"tetrahedra": pytest.approx(0, abs=1e-12)}  # of the frames that have an arm
     assert found.find("change", "moment_arm", "mean") is not None
     assert bars().find("change", "joint_moment", "force") is None

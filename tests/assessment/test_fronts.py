@@ -5,7 +5,7 @@ import math
 import pytest
 from studied import COST, ERROR, point
 
-from fem_reference.assessment.fronts import at_same_cost, at_same_error, levels, pareto, price, solvers
+from fem_reference.assessment.fronts import levels, match, pareto, price, solvers
 
 
 def test_a_point_is_on_the_front_unless_another_is_as_cheap_and_nearer() -> None:
@@ -37,18 +37,18 @@ def test_there_is_no_price_where_more_cost_does_not_help() -> None:
 
 def test_solvers_are_compared_at_most_at_what_is_asked() -> None:
     points = [point(8, 1), point(2, 4), point(1, 100), point(3, 3, "arap"), point(0.5, 50, "fem")]
-    at_five = at_same_cost(points, ERROR, COST, 5)
+    at_five = match(points, ERROR, COST, same=COST, at=5)
     assert {name: one.errors[ERROR] for name, one in at_five.best.items()} == {"pbd": 2, "arap": 3}
-    at_four = at_same_cost(points, ERROR, COST, 4)  # what costs just as much is within it
+    at_four = match(points, ERROR, COST, same=COST, at=4)  # what costs just as much is within it
     assert at_four.best["pbd"].errors[ERROR] == 2
-    within_two = at_same_error(points, ERROR, COST, 2)
+    within_two = match(points, ERROR, COST, same=ERROR, at=2)
     assert {name: one.costs[COST] for name, one in within_two.best.items()} == {"pbd": 4, "fem": 50}
     assert solvers(points) == ("pbd", "arap", "fem")
     alike = [point(2, 9), point(2, 3)]  # equally near
-    assert at_same_cost(alike, ERROR, COST, 10).best["pbd"] is alike[1]
+    assert match(alike, ERROR, COST, same=COST, at=10).best["pbd"] is alike[1]
 
 
 def test_levels_are_round_and_within_the_range() -> None:
     points = [point(0.03, 1), point(7, 0.001)]
-    assert levels(points, ERROR, COST, of_error=True, count=9) == pytest.approx((0.05, 0.1, 0.2, 0.5, 1, 2, 5))
-    assert levels([], ERROR, COST, of_error=True) == ()
+    assert levels(points, ERROR, COST, same=ERROR, count=9) == pytest.approx((0.05, 0.1, 0.2, 0.5, 1, 2, 5))
+    assert levels([], ERROR, COST, same=ERROR) == ()

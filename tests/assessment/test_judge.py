@@ -112,7 +112,13 @@ def test_units_of_tolerances_are_those_of_the_measure() -> None:
 
 @pytest.mark.parametrize(
     ("unit", "truth", "value"),
-    [("mm", "1 cm", 10.0), ("%", "0.02", 2.0), ("mm3", "1 cm^3", 1000.0), ("deg", "0.5 rad", 90 / math.pi)],
+    [
+        ("mm", "1 cm", 10.0),
+        ("%", "0.02", 2.0),
+        ("mm3", "1 cm^3", 1000.0),
+        ("deg", "0.5 rad", 90 / math.pi),
+        ("kPa", "0.02 MPa", 20.0),
+    ],
 )
 def test_a_truth_is_taken_into_the_unit_of_its_measure(unit, truth, value) -> None:
     found = judged([value] * 3, unit=unit, truth=truth, within=truth)

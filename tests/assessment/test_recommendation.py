@@ -166,7 +166,7 @@ def test_none_is_recommended_where_none_meets_what_is_asked() -> None:
 def test_a_study_is_the_same_when_read_back(tmp_path) -> None:
     path = tmp_path / "study.json"
     path.write_text(json.dumps(facts(STUDIES[0], {"machine": "here"})))
-    assert load(path) == STUDIES[0] or vars(load(path)) == vars(STUDIES[0])
+    assert list(map(vars, load(path))) == [vars(STUDIES[0])]
 
 
 @pytest.mark.parametrize(

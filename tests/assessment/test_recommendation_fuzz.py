@@ -56,7 +56,7 @@ def test_whatever_a_study_says_a_recommendation_is_finite_or_refused(data: st.Da
     for case, known in (("bar", features(50)), ("new", features(70, 3000))):
         for metric, limits in ((RMS, {"error": 6.0}), (PERCENT, {"time": 0.004}), (RMS, {"error": 0.1, "time": 0.004})):
             try:
-                found = recommend(known, case, [load(tmp_path / "study.json"), study("b", 80)], metric, limits)
+                found = recommend(known, case, [*load(tmp_path / "study.json"), study("b", 80)], metric, limits)
             except InputError:
                 continue
             for one in (found.best, found.nearest):

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference import effects
 from fem_reference.assessment import second_check
-from fem_reference.assessment.run_checks import RunCheck, of_body, of_muscle
+from fem_reference.assessment.run_checks import RunCheck, _give, of_body, of_muscle
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.motion import RigidMotion as Turn
 from fem_reference.geometry.rigid_bodies import Sphere
@@ -21,6 +21,8 @@ from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Affine
 from fem_reference.runs.store import Frame, Run, collected
+
+BONES = ("floor", "lid")
 
 
 def lost(problem: MuscleProblem, run: Run) -> list[str]:
@@ -76,6 +78,15 @@ def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:
         moved = np.array(run.positions)
         moved[2, free] -= [farther, 0.0, 0.0]
         assert lost(problem, replace(run, positions=moved)) == found
+
+
+def test_contact_gives_way_by_the_pressure_over_its_stiffness(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    for stiffness, given in ((1.0, 0.5), (10.0, 0.05)):
+        contact = effects.make("contact", stiffness=f"{stiffness} MPa/mm", bones=("ball",))
+        pressed = replace(problem, effects=(*problem.effects[:2], contact))
+        none, some = (_give(pressed, problem.bones[2], pressure) for pressure in (0.0, 0.5))
+        assert some - none == pytest.approx(given)
 
 
 def test_bones_that_are_not_in_contact_may_cross(tmp_path) -> None:
@@ -173,9 +184,7 @@ def test_bones_carry_weights_and_dead_loads(tmp_path) -> None:
     pulled = effects.make("traction", on="free", force="1, 0, 0 kPa", ramp=ramp)
     problem = replace(problem, effects=(*problem.effects, weighs, pulled))
     carried = np.linspace(0, 2, 5)[:, None] * [1.6, 0.0, -0.03924]
-    scalars = {
-        f"force_on_{bone}_{axis}": carried[:, i] / 2 for bone in ("floor", "lid") for i, axis in enumerate("xyz")
-    }
+    scalars = {f"force_on_{bone}_{axis}": carried[:, i] / 2 for bone in BONES for i, axis in enumerate("xyz")}
     origin, cost = {"settings": {"residual": 1e-9}}, {"unknowns": 1e4}
     run = replace(resting(problem, **scalars), origin=origin, outcome=replace(CONVERGED, cost=cost))
     assert lost(problem, run) == []
@@ -184,7 +193,22 @@ def test_bones_carry_weights_and_dead_loads(tmp_path) -> None:
     for wrong in (1e-3, np.nan):
         less = run.scalars | {"force_on_lid_z": run.scalars["force_on_lid_z"] + [0, 0, 0, wrong, 0]}
         assert lost(problem, replace(run, scalars=less)) == ["forces that bones do not carry"]
-    # A pressure follows the surface: its sum is not known.
+    # What the solver recorded is checked too, and the moment with it.
+    recorded = run.scalars | {f"load_force_{axis}": carried[:, i] for i, axis in enumerate("xyz")}
+    recorded |= {f"load_moment_{axis}": carried[:, i] * 20 for i, axis in enumerate("xyz")}
+    recorded |= {f"moment_on_{bone}_{axis}": carried[:, i] * 10 for bone in BONES for i, axis in enumerate("xyz")}
+    assert lost(problem, replace(run, scalars=recorded)) == []
+    allowed = {
+        one.name: one.allowed for one in of_muscle(problem, replace(run, scalars=recorded)) if "carry" in one.name
+    }
+    assert allowed["moments that bones do not carry"] == pytest.approx(40e-6, rel=0.01)  # times the farthest coordinate
+    for kind in ("force", "moment"):
+        for wrong in (1e-3, np.nan):
+            more = recorded | {f"load_{kind}_y": recorded[f"load_{kind}_y"] + [0, 0, wrong, 0, 0]}
+            assert lost(problem, replace(run, scalars=more)) == [f"{kind}s that bones do not carry"]
+    both = recorded | {key: 2 * value for key, value in recorded.items()}  # of twice the density: not that of the scene
+    assert lost(problem, replace(run, scalars=both)) == ["forces that bones do not carry"]
+    # A pressure follows the surface: its sum is not known, unless it is recorded.
     squeezed = effects.make("pressure", on="free", pressure="1 kPa", ramp=ramp)
     unknown = replace(problem, effects=(*problem.effects, squeezed))
     assert not [one for one in of_muscle(unknown, run) if "carry" in one.name]

@@ -32,6 +32,8 @@ WRITTEN = {
     "binary.vtk": ({}, 0.0),
     "text.vtk": ({"binary": False}, 0.0),
     "binary.vtu": ({}, 0.0),
+    "binary.msh": ({"file_format": "gmsh"}, 0.0),
+    "old.msh": ({"file_format": "gmsh22"}, 0.0),
 }
 
 
@@ -69,7 +71,7 @@ def test_a_surface_comes_back_as_it_was_written(suffix: str, tmp_path: Path) -> 
 # Where a file does not state its size, only a cut before its triangles shows anyhow.
 CUTS = [
     (suffix, share)
-    for suffix in WRITTEN_BY_US
+    for suffix in formats()
     for share in (0.0, 0.01, 0.2, 0.4, 0.7, 0.97)
     if formats()[suffix].states_size or share < 0.5
 ]
@@ -81,7 +83,8 @@ def test_what_was_written_and_cut_off_is_refused(
 ) -> None:
     """The contract of formats: nobody takes half a file for a whole one, and nobody prints."""
     path = tmp_path / f"ball{suffix}"
-    files.write_surface(path, BALL, BALL.points)
+    write = files.write_surface if suffix in WRITTEN_BY_US else shapes.write
+    write(path, BALL, BALL.points)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(InputError, match=rf"^{re.escape(str(path))}: got \S.*, {UNREADABLE}"):
@@ -262,11 +265,14 @@ def test_what_is_not_a_triangle_surface_is_refused(tmp_path: Path, name: str, te
         files.read_surface(path, 1.0)
 
 
-def test_tetrahedra_are_no_surface(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "got"), [("body.vtu", "cells of VTK type 10"), ("body.msh", "cells of type tetra")])
+def test_tetrahedra_are_no_surface(tmp_path: Path, name: str, got: str) -> None:
     body = shapes.box((1, 1, 1), (1.0, 1.0, 1.0))
-    meshio.Mesh(body.points, [("tetra", body.tets)]).write(tmp_path / "body.vtu")
-    with pytest.raises(InputError, match="cells of VTK type 10"):
-        files.read_surface(tmp_path / "body.vtu", 1.0)
+    meshio.Mesh(body.points, [("tetra", body.tets)]).write(
+        tmp_path / name, **({"file_format": "gmsh"} if "msh" in name else {})
+    )
+    with pytest.raises(InputError, match=got):
+        files.read_surface(tmp_path / name, 1.0)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import hostile
+import hostile_runs
 import numpy as np
 import pytest
 
@@ -27,7 +28,7 @@ from fem_reference.scenes.made import make_case
 from fem_reference.solvers import fenicsx, recorded
 
 SCENE = (HOME / "cases" / "box_squeeze" / "case.toml").read_text(encoding="utf-8")
-BALL = hostile.BALL
+BALL = hostile_runs.BALL
 
 
 def scene(folder: Path, old: str = "", new: str = "", before: str = "") -> Path:
@@ -66,7 +67,7 @@ def test_a_baseline_and_a_run_without_end_are_refused(text: str, tmp_path: Path)
     for name in ("ball.json", "run.json"):
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=r"ball\.json: got .*want the baseline of a candidate"):
-        baseline.read(tmp_path / "ball.json", hostile.BALL_SCENE, "mine")
+        baseline.read(tmp_path / "ball.json", hostile_runs.BALL_SCENE, "mine")
     with pytest.raises(InputError, match=r"run\.json: got .*want the run\.json of a stored run"):
         store.load(tmp_path)
     assert store.status(tmp_path) == "damaged"

@@ -49,7 +49,9 @@ def compared(tmp_path, monkeypatch: pytest.MonkeyPatch) -> Comparison:
     arms = tuple(
         Measure("moment_arm", name, "mm", value + np.arange(5.0)) for name, value in (("mean", 3.0), ("least", 2.0))
     )
+    by_force = (Measure("joint_moment", "arm", "mm", np.array([np.nan, 8, 8, 8, 8])),)
     changes = found.changes | {name: found.changes[name] + arms for name in ("reference", "quick")}
+    changes["reference"] += by_force
     context = replace(found.context, bones=(bone,), joints=(joint,))
     return replace(found, setup=setup, context=context, changes=changes, reference=pulled(found.reference))
 
@@ -85,7 +87,8 @@ def test_the_table_is_read_back(compared: Comparison, tmp_path) -> None:
     assert_allclose([float(row["moment_x_N_mm"]) for row in own], 32 * np.arange(5))
     assert_allclose([float(row["angle_deg"]) for row in own], np.degrees(0.1) * np.arange(5))
     assert [float(row["moment_arm_mean_mm"]) for row in own] == [3, 4, 5, 6, 7]
-    assert own[0]["at_x_mm"] == ""  # no force, no point
+    assert own[0]["at_x_mm"] == own[0]["moment_arm_by_force_mm"] == ""  # no force, no point, no arm
+    assert [row["moment_arm_by_force_mm"] for row in rows[1:6]] == ["8.0"] * 4 + [""]
     quick = rows[5]
     assert (quick["force_x_N"], quick["moment_arm_least_mm"], quick["moment_arm_greatest_mm"]) == ("", "2.0", "")
 

@@ -36,6 +36,9 @@ def test_derivatives_by_hand(name) -> None:
     for got, expected in ((jet.value, value), (jet.slope[0], slope), (jet.curvature[0, 0], curvature)):
         # A handful of roundings of numbers up to 120.
         assert np.broadcast_to(got, X.shape) == pytest.approx(expected, rel=1e-13, abs=1e-13)
+    flat = function(*variables(X[None], curved=False))  # nobody asks for the curvature
+    assert (np.array_equal(flat.value, jet.value), np.array_equal(flat.slope, jet.slope)) == (True, True)
+    assert flat.curvature is None
 
 
 def test_mixed_derivatives_by_hand() -> None:

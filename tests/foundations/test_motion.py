@@ -69,5 +69,5 @@ def test_rest_before_a_slide_is_exact() -> None:
 
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
 def test_length_of_the_direction_does_not_matter(scale: float) -> None:
-    x, y, z = (scale * entry for entry in SLIDE.direction)
+    x, y, z = (scale * entry for entry in SLIDE.axis)
     assert RigidMotion((x, y, z), None, SLIDE.frames, SLIDE.amounts).pose(7) == pytest.approx(SLIDE.pose(7), abs=1e-12)

@@ -324,7 +324,7 @@ def test_an_angle_is_expected_in_units_of_angle() -> None:
 
 
 def test_the_judge_reads_the_unit_of_every_measure() -> None:
-    of_unit = {"%": "1 %", "mm": "1 mm", "mm3": "1 mm3", "deg": "1 deg", "N": "1 N", "N mm": "1 N mm"}
+    of_unit = {"%": "1 %", "mm": "1 mm", "mm3": "1 mm3", "deg": "1 deg", "N": "1 N", "N mm": "1 N mm", "kPa": "1 kPa"}
     assert {"edge_extension", "dihedral_angle"} <= set(names())
     for name, unit in units({"surface", "lines"}).items():
         metric, statistic = name.split(".")

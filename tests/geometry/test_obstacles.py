@@ -63,3 +63,21 @@ def test_a_path_goes_through_the_hole_of_a_ring() -> None:
     ends = np.array([[1.0, 0, -5], [20, 0, -5], [30, 0, 5]])
     # Within the hole where it is; outside on the inner circle; on one side alone, in the middle.
     assert_allclose(ring.through(starts, ends), [[1, 0, 0], [6, 0, 0], [25, 0, 5]], atol=1e-12)
+
+
+@pytest.mark.parametrize("obstacle", EVERY)
+@pytest.mark.parametrize("away", [0.0, 1e-15, 1e-10, 1e-8])
+def test_the_middle_is_inside_and_pushed_out(obstacle, away) -> None:
+    """Where no direction leads out more than others: the centre, a point of the axis, a point of the circle."""
+    along = np.array([obstacle.radius if isinstance(obstacle, Ring) else 0.0, away, 0.0])
+    middle = (obstacle.pose[:3, 3] + obstacle.pose[:3, :3] @ along)[None]
+    pushed = obstacle.pushed(middle)
+    assert obstacle.level(middle)[0][0] < -0.9 * min(1.0, obstacle.bend**2)
+    assert abs(obstacle.level(pushed)[0][0]) < 1e-3 * max(1.0, obstacle.bend**2)
+
+
+def test_the_axis_of_a_ring_is_in_its_hole() -> None:
+    ring = EVERY[2]
+    on_axis = ring.pose[:3, 3] + np.array([[-1.0], [0], [1e-13], [2]]) * ring.pose[:3, 2]
+    assert_allclose(ring.level(on_axis)[0], 8.0**2 + np.array([1, 0, 0, 4]) - 2.5**2, rtol=1e-12)
+    assert_allclose(ring.pushed(on_axis), on_axis, atol=1e-12)

@@ -7,10 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ellipeinc
 
-from fem_reference.geometry import winding
+from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
 from fem_reference.geometry.winding import Winding, around
-from fem_reference.geometry.wrapping import WrappingCylinder, WrappingSphere
 
 RANDOM = np.random.default_rng(3)
 
@@ -39,11 +38,8 @@ def sampled(paths: Winding, count: int) -> np.ndarray:
 def test_around_a_ball_or_a_roll_it_is_the_closed_form(kind) -> None:
     """The error of Runge-Kutta's method, 1e-7 of the radius for half a turn."""
     starts, ends = (RANDOM.uniform(-4, 4, (60, 3)) + [x, 0, 0] for x in (-9, 9))
-    if kind == "sphere":
-        quadric, closed = Quadric(np.eye(4), np.full(3, 4.0)), WrappingSphere((0, 0, 0), 4.0)
-    else:
-        quadric, closed = Quadric(np.eye(4), np.array([4.0, 4, np.inf])), WrappingCylinder((0, 0, 0), (0, 0, 1), 4.0)
-    found, exact = around([quadric], starts, ends), closed.around(starts, ends)
+    quadric = Quadric(np.eye(4), np.array([4.0, 4, 4 if kind == "sphere" else np.inf]))
+    found, exact = around([quadric], starts, ends), wrapping.around(quadric, starts, ends)
     assert not found.failed.any()
     assert (exact.turns > 0).sum() > 20
     assert_allclose(found.lengths, exact.lengths, rtol=1e-7)
@@ -82,8 +78,8 @@ def test_over_the_tube_of_a_ring(tube) -> None:
 
 def test_through_the_hole_of_a_ring_it_is_straight() -> None:
     ring = Ring(np.eye(4), 10.0, 2.0)
-    starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0]]), np.array([[-3.0, 1, -7], [0.0, 8, 0]])
-    paths = around([ring], starts, ends)  # the second between two points of the inner circle
+    starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0], [0, 0, 9]]), np.array([[-3.0, 1, -7], [0.0, 8, 0], [0, 0, -9]])
+    paths = around([ring], starts, ends)  # the second between two points of the inner circle, the third along the axis
     assert not paths.failed.any()
     assert_allclose(paths.lengths, np.linalg.norm(ends - starts, axis=1), rtol=1e-12)
 
@@ -117,3 +113,41 @@ def test_directions_are_the_slopes_of_the_length() -> None:
 def test_what_crosses_an_obstacle_has_failed(monkeypatch) -> None:
     monkeypatch.setattr(winding, "met", lambda _, string: [() for _ in string])
     assert around([BALL], np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])).failed.tolist() == [True]
+
+
+@pytest.mark.parametrize("radius", [1e-12, 1e-30])
+def test_around_what_has_hardly_a_size_no_path_is_no_number(radius) -> None:
+    """Newton's method cannot bend a path around it: not found, and never not-a-number."""
+    paths = around([Quadric(at(0, 4, 0), np.full(3, radius))], np.array([[0.0, 4, -15]]), np.array([[0.0, 4, 15]]))
+    assert paths.failed.tolist() == [True]
+
+
+def test_a_path_that_is_no_number_has_failed(monkeypatch) -> None:
+    plain = winding._geodesic
+
+    def lost(*given) -> tuple[np.ndarray, np.ndarray]:
+        points, tangents = plain(*given)
+        return points * [[[np.nan]] * len(given[1])], tangents
+
+    monkeypatch.setattr(winding, "_geodesic", lost)
+    assert around([BALL], np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])).failed.tolist() == [True]
+
+
+def test_a_tube_so_thin_that_a_string_slips_past_it_has_no_path() -> None:
+    """It would take 2e7 points to follow it past a tube of 1 nm."""
+    starts, ends = np.array([[12.0, 0, 9]]), np.array([[12.0, 0, -9]])
+    assert around([Ring(np.eye(4), 10.0, 1e-6)], starts, ends).failed.tolist() == [True]
+    # A thread of 0.1 mm is followed: its length is that of two straight lines by the inside of the ring, but for its thickness.
+    paths = around([Ring(np.eye(4), 10.0, 0.1)], starts, ends)
+    assert paths.failed.tolist() == [False]
+    assert_allclose(paths.lengths, 2 * math.hypot(9, 2.1), rtol=1e-4)
+
+
+def test_a_path_much_longer_than_the_string_has_failed() -> None:
+    """The way over a ball beside a string that slipped through it, which is 3 % shorter."""
+    starts, ends = np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])
+    found = around([BALL], starts, ends)
+    straight = starts[:, None] + np.linspace(0, 1, 9)[None, :, None] * (ends - starts)[:, None]
+    assert 1.02 < found.lengths[0] / 20 < 1.15
+    assert winding._wrong([BALL], found, straight).tolist() == [True]
+    assert winding._wrong([BALL], found, sampled(found, 99)).tolist() == [False]

@@ -1,6 +1,7 @@
 """Paths around spheres and cylinders: closed forms, an independent minimisation, and what every shortest path has."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,10 +9,40 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
+from fem_reference.geometry.obstacles import Quadric
+from fem_reference.geometry.wrapping import Paths, around, straight
 
-BALL = WrappingSphere((1.0, -2.0, 3.0), 5.0)
-ROLL = WrappingCylinder((1.0, -2.0, 3.0), (0.2, -0.5, 2.0), 5.0)
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball of ``radius`` about ``centre`` [mm], and paths around it."""
+
+    centre: tuple[float, float, float]
+    radius: float
+
+    def around(self, starts: np.ndarray, ends: np.ndarray) -> Paths:
+        pose = np.eye(4)
+        pose[:3, 3] = self.centre
+        return around(Quadric(pose, np.full(3, self.radius)), starts, ends)
+
+
+@dataclass(frozen=True)
+class Roll:
+    """The infinite cylinder of ``radius`` [mm] about the line through ``point`` [mm] along ``axis``, and paths around it."""
+
+    point: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    radius: float
+
+    def around(self, starts: np.ndarray, ends: np.ndarray) -> Paths:
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.align_vectors([self.axis], [[0, 0, 1]])[0].as_matrix()
+        pose[:3, 3] = self.point
+        return around(Quadric(pose, np.array([self.radius, self.radius, np.inf])), starts, ends)
+
+
+BALL = Ball((1.0, -2.0, 3.0), 5.0)
+ROLL = Roll((1.0, -2.0, 3.0), (0.2, -0.5, 2.0), 5.0)
 
 
 def depths(obstacle, points: np.ndarray) -> np.ndarray:
@@ -39,7 +70,7 @@ def one(obstacle, start, end) -> Paths:
 @pytest.mark.parametrize("distance", [5.0, 6.0, 13.0])
 def test_around_a_sphere_between_opposite_points(distance) -> None:
     # Two tangents of sqrt(d^2 - r^2), and r (pi - 2 acos(r / d)) between.
-    ball = WrappingSphere((0, 0, 0), 5.0)
+    ball = Ball((0, 0, 0), 5.0)
     length = 2 * math.sqrt(distance**2 - 25) + 5 * (math.pi - 2 * math.acos(5 / distance))
     paths = one(ball, [-distance, 0, 0], [distance, 0, 0])
     assert_allclose(paths.lengths, length, rtol=1e-14)
@@ -54,7 +85,7 @@ def test_a_quarter_of_a_great_circle() -> None:
 
 def test_a_helix() -> None:
     # Unrolled, a third of a turn on radius 2 with a climb of 7 is the hypotenuse of a right triangle.
-    roll = WrappingCylinder((0, 0, 9.0), (0, 0, 3.0), 2.0)
+    roll = Roll((0, 0, 9.0), (0, 0, 3.0), 2.0)
     end = [2 * math.cos(2 * math.pi / 3), 2 * math.sin(2 * math.pi / 3), 7.0]
     paths = one(roll, [2, 0, 0], end)
     assert_allclose(paths.lengths, math.hypot(2 * 2 * math.pi / 3, 7), rtol=1e-14)
@@ -63,7 +94,7 @@ def test_a_helix() -> None:
 
 def test_across_a_cylinder_it_is_the_path_around_a_sphere() -> None:
     ends = (np.add(BALL.centre, [-8, 1, 0]), np.add(BALL.centre, [7, 2, 0]))
-    across = one(WrappingCylinder(BALL.centre, (0, 0, 1), BALL.radius), *ends)
+    across = one(Roll(BALL.centre, (0, 0, 1), BALL.radius), *ends)
     assert_allclose(across.lengths, one(BALL, *ends).lengths, rtol=1e-14)
 
 
@@ -107,7 +138,7 @@ def test_no_path_over_visible_points_is_shorter(obstacle) -> None:
 
 
 def least(obstacle, start: np.ndarray, end: np.ndarray) -> float:
-    if isinstance(obstacle, WrappingSphere):
+    if isinstance(obstacle, Ball):
 
         def surface(u):  # angles of latitude and longitude
             normal = np.array([math.cos(u[0]) * math.cos(u[1]), math.cos(u[0]) * math.sin(u[1]), math.sin(u[0])])
@@ -148,9 +179,7 @@ def test_moving_everything_moves_the_path(kind) -> None:
     obstacle = BALL if kind == "sphere" else ROLL
     turn, shift = Rotation.from_rotvec([0.3, -1.1, 0.7]), np.array([30.0, -70, 11])
     middle = tuple(turn.apply(np.array([1.0, -2.0, 3.0])) + shift)
-    moved = (
-        WrappingSphere(middle, 5.0) if kind == "sphere" else WrappingCylinder(middle, tuple(turn.apply(ROLL.axis)), 5.0)
-    )
+    moved = Ball(middle, 5.0) if kind == "sphere" else Roll(middle, tuple(turn.apply(ROLL.axis)), 5.0)
     starts, ends = outside(obstacle, 30, 8), outside(obstacle, 30, 9)
     still, other = obstacle.around(starts, ends), moved.around(turn.apply(starts) + shift, turn.apply(ends) + shift)
     which, shares = np.arange(30), np.linspace(0, 1, 30)

@@ -3,6 +3,7 @@
 import re
 
 import measured
+import measurements
 import pages
 import pytest
 
@@ -13,19 +14,39 @@ def test_the_pages_have_the_tables_that_are_kept() -> None:
 
 def test_every_table_has_its_place() -> None:
     places = re.findall(r"<!-- measured: (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
-    assert set(places) == set(measured.TABLES)
+    assert set(places) == set(measurements.TABLES)
 
 
-@pytest.mark.parametrize("name", measured.MEASUREMENTS)
+@pytest.mark.parametrize("name", measurements.MEASUREMENTS)
 def test_a_measurement_says_its_command_commit_date_and_machine(name) -> None:
-    file = measured.kept(name)
-    assert file["command"] == f"./fem {measured.MEASUREMENTS[name].words}"
+    file = measurements.kept(name)
+    assert file["command"] == measurements.MEASUREMENTS[name].command
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", file["date"])
     assert re.fullmatch(r"[0-9a-f]{7,}", file["commit"])
     assert file["machine"]
 
 
 def test_what_is_kept_of_the_catalogue_passes() -> None:
-    for entry in measured.kept("verify")["measured"]:
+    for entry in measurements.kept("verify")["measured"]:
         assert entry["verdict"] == "pass"
         assert entry["error"] <= entry["within"], entry["name"]
+
+
+def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
+    """A sentence as ``studies.hard.following.in_steps`` writes it, with a number of load steps that ended with a status."""
+    sentence = "unstable; end state at frame 5 by number of load steps: 1: 1.5e-13 % from that of 10, 40: out of steps"
+    cells = [
+        {"case": "twist", "solver": "fenicsx", "verdict": "ok", "sentence": sentence},
+        {"case": "hip", "solver": "fenicsx", "verdict": "ok", "sentence": "volume 1 % at frame 3"},
+        {"case": "twist", "solver": "pbd", "verdict": "failed", "sentence": ""},
+    ]
+    kept = measurements.MEASUREMENTS["stress"].keep({"solvers": ["fenicsx", "pbd"], "cells": cells})
+    assert kept["counts"] == [{"solver": "fenicsx", "ok": 2}, {"solver": "pbd", "failed": 1}]
+    off = {"1": 1.5e-13, "40": "out of steps", "10": "finest"}
+    assert kept["ends"] == [{"case": "twist", "verdict": "ok", "frame": 5, "off": off}]
+
+
+def test_every_solver_has_as_many_hard_cases() -> None:
+    found = measurements.kept("stress")["measured"]
+    assert len({sum(count for count in one.values() if isinstance(count, int)) for one in found["counts"]}) == 1
+    assert len(found["ends"]) > 20

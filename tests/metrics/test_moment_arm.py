@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.foundations.motion import RigidMotion, apply
-from fem_reference.geometry.wrapping import WrappingCylinder, WrappingSphere
+from fem_reference.geometry.obstacles import Quadric
+from fem_reference.geometry.wrapping import around
 from fem_reference.metrics import MeasurementContext, at_rest, measure
 from fem_reference.metrics.moment_arm import excursion_arms, turning
 from fem_reference.problems.setup import Bone, Joint
@@ -86,11 +87,9 @@ def test_the_error_is_of_second_order_in_the_angle() -> None:
 def test_a_line_around_an_obstacle_has_the_radius_of_that_obstacle(obstacle: str) -> None:
     """In the plane across the axis the path's length is linear in the angle while it wraps: the slope is exact."""
     radius, joint = 20.0, joint_of(np.radians(np.linspace(0, 20, 9)))
-    round_it = (
-        WrappingSphere((0, 0, 0), radius) if obstacle == "sphere" else WrappingCylinder((0, 0, -1), (0, 0, 1), radius)
-    )
+    quadric = Quadric(np.eye(4), np.array([radius, radius, radius if obstacle == "sphere" else np.inf]))
     starts, end = np.array([[-50.0, -10, 0]]), np.array([[50.0, -10, 0]])
-    lengths = np.array([round_it.around(starts, apply(joint.bone.pose(i), end)).lengths for i in range(9)])
+    lengths = np.array([around(quadric, starts, apply(joint.bone.pose(i), end)).lengths for i in range(9)])
     run = straight(joint, 9)
     assert_allclose(np.abs(excursion_arms(lengths, context_of(joint, run), run.numbers)), radius, rtol=1e-6)
 
@@ -154,3 +153,13 @@ def test_against_itself_zero_and_from_rest_the_arm() -> None:
     assert_allclose(worst.values, arms.max(axis=1), rtol=1e-9)
     assert_allclose([least.values, greatest.values], np.sort(arms, axis=1).T, rtol=1e-9)  # of two fibres
     assert measure(run, run, replace(context, joints=()), ["moment_arm"]) == ()
+
+
+def test_where_a_joint_turns_back_the_way_there_says_nothing() -> None:
+    """A muscle that is longer on the way back, by 2 mm, as a viscous one: its arm there is that of the way back alone."""
+    angles = np.array([0.0, 0.5, 0.1])
+    joint = joint_of(angles)
+    run = straight(joint, 3)
+    lengths = np.array([[30.0], [28.0], [31.0]])
+    arms = excursion_arms(lengths, context_of(joint, run), run.numbers)[:, 0]
+    assert_allclose(arms, [4.0, 4.0, 7.5], rtol=1e-12)

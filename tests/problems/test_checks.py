@@ -1,5 +1,7 @@
 """What a body from Python cannot be is refused before it is solved, by argument, what was got and what is wanted."""
 
+import cProfile
+import pstats
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +12,14 @@ from fem_reference import effects
 from fem_reference.problems.body import ByCell
 from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Along, Rest
+from fem_reference.runs.store import Outcome
+from fem_reference.solvers.fenicsx.processes import installed
+from fem_reference.solvers.fenicsx.session import Session
 
 ALL, STILL = (0, 1, 2), ((0.0, 0.0, 0.0),) * 3
 NAN, INF = float("nan"), float("inf")
 MESH = fr.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+MIDDLES = MESH.points[MESH.cells].mean(axis=1)
 FIXED = fr.Prescribed("bottom", "z0", ALL, Rest())
 TOP = fr.Prescribed("top", "z1", ALL, Affine(STILL, (0.0, 0.0, 0.1)))
 BODY = fr.Body(MESH, (fr.make_effect("neo_hooke", mu=0.01),), (FIXED, TOP), (0.0, 1.0))
@@ -136,6 +142,12 @@ def test_parts_are_what_they_should_be(changes, message) -> None:
         (ByCell(np.eye(3)[[0, 0, 0, 0, 0, 2]] * np.array([1, 1, 1, 1, 1, 1.01])[:, None]), "of length 1.01 in cell 5"),
         (ByCell(np.eye(3)), "fibre: got IndexError"),
         (lambda *given: given[1][:, 0], r"fibre: got directions \(6,\) at points \(6, 3\)"),
+        # As long as they should be in the middles of cells alone.
+        (
+            lambda _, points: np.eye(3)[[2] * 6] * (1 + np.abs(points - MIDDLES).max(axis=1))[:, None],
+            "a direction of len",
+        ),
+        (lambda _, points: np.where(np.abs(points - MIDDLES) < 1e-9, [0.0, 0, 1], NAN), "a direction of length nan"),
     ],
 )
 def test_fibres_are_unit_vectors(fibre, message) -> None:
@@ -199,3 +211,21 @@ def test_bones_and_a_start_are_what_they_should_be() -> None:
     refused(replace(BODY, bones=(3,)), r"bones\[0\]: got int 3, want ContactBone records")
     refused(replace(BODY, start=lambda points: points * NAN), "start: got places .*, not all finite")
     refused(replace(BODY, start=lambda _: np.zeros(3)), r"start: got places \(3,\)")
+
+
+@pytest.mark.skipif(not installed(), reason="FEniCSx is not installed")
+def test_each_check_of_a_body_runs_once(monkeypatch) -> None:
+    monkeypatch.setattr(Session, "run", lambda *_: Outcome("diverged", "nothing was solved"))
+    with cProfile.Profile() as profile:
+        fr.solve_body(BODY, element="P1")
+    calls = {name: entry[1] for (_, _, name), entry in pstats.Stats(profile).stats.items()}  # type: ignore[attr-defined]
+    once = "check check_frames check_element check_quadrature check_agreement _check_start require_installed"
+    assert {name: calls.get(name, 0) for name in once.split()} == dict.fromkeys(once.split(), 1)
+
+
+def test_quadrature_suits_the_element() -> None:
+    body = replace(BODY, effects=(*BODY.effects, fr.make_effect("incompressible", bulk=1.0)))
+    check(body, "P1/P1", 2)
+    check(body, "P2/P1", 1)
+    with pytest.raises(fr.InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
+        check(body, "P1/P1", 1)

@@ -11,7 +11,7 @@ from fem_reference.metrics import Measure
 from fem_reference.problems.setup import Joint
 from fem_reference.report import gallery
 from fem_reference.report.curves import curves, surface_limits
-from tests.report.comparisons import alone, measured, with_bars
+from tests.report.comparisons import alone, html, measured, with_bars
 
 
 def test_curves_show_where_a_run_is_not_a_number(comparison):
@@ -45,6 +45,22 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
     assert logarithmic
     assert (low, high) == (pytest.approx(4e-3), pytest.approx(1.3 * 1.5e4))
     assert surface_limits(alone(comparison)) == (0.0, 1.04, False)
+
+
+def test_each_of_nine_candidates_has_a_colour_of_its_own_in_the_key_and_in_the_curves(comparison):
+    quick = comparison.candidates[0]
+    many = tuple(replace(quick, name=f"quick{i}") for i in range(9))
+    deviations = {run.name: comparison.deviations["quick"] for run in many}
+    changes = {run.name: comparison.changes["quick"] for run in many} | {"reference": comparison.changes["reference"]}
+    wide = replace(comparison, candidates=many, deviations=deviations, changes=changes)
+    key = re.search("Curves:.*?Lengths", html(wide), re.DOTALL)
+    assert key is not None
+    colours = re.findall(r"color:var\(--c-(\w+)", key[0])
+    assert len(colours) == len(set(colours)) == 10
+    (volume,) = (one.markup for one in curves(wide) if one.title == "Change of volume from rest")
+    assert {f"--c-{colour}" for colour in colours} <= set(re.findall(r"--c-\w+", volume))
+    surfaces = [one.markup for one in curves(wide) if one.title.startswith("Surface of")]
+    assert len({re.search(r"stroke: var\((--c-\w+)", markup)[1] for markup in surfaces}) == 9
 
 
 def with_joint(comparison: Comparison, angles: tuple[float, ...]) -> Comparison:

@@ -2,8 +2,13 @@
 
 import base64
 import io
+import itertools
 import re
 
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from PIL import Image
 
 from fem_reference.report import drawings
@@ -33,6 +38,38 @@ def test_colours_are_those_of_the_page_and_stay_what_they_are_where_it_says_noth
     assert "metadata" not in text
 
 
+# Colours as dichromats see them: Machado, Oliveira, Fernandes 2009, IEEE Trans. Vis. Comput. Graph. 15(6), severity 1.
+VISION = {
+    "all": np.eye(3),
+    "no red": np.array([[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]]),
+    "no green": np.array([[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]),
+    "no blue": np.array([[1.2555, -0.0767, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]]),
+}
+
+
+def seen(colour: str, vision: np.ndarray) -> np.ndarray:
+    """A colour in CIELAB, in which a distance of 2.3 is just noticeable."""
+    stored = np.array(to_rgb(colour))
+    light = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    share = to_xyz @ np.clip(vision @ light, 0, 1) / [0.9505, 1.0, 1.089]
+    x, y, z = np.where(share > 0.008856, np.cbrt(share), 7.787 * share + 16 / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+def test_no_two_runs_have_one_colour() -> None:
+    assert len({drawings.colour_of(i) for i in range(40)}) == 40
+
+
+@pytest.mark.parametrize("vision", VISION)
+def test_ten_runs_are_told_apart_by_their_lines_whatever_colours_one_sees(vision) -> None:
+    for one, other in itertools.combinations(map(drawings.look_of, range(11)), 2):
+        if one["linestyle"] == other["linestyle"]:
+            # Four times what is just noticeable, as lines are thin.
+            apart = seen(one["color"], VISION[vision]) - seen(other["color"], VISION[vision])
+            assert np.linalg.norm(apart) > 10, (one, other)
+
+
 def test_powers_of_ten_are_written_as_numbers() -> None:
     text = drawings.drawn("one", "One", (3, 2), line).markup
     assert {"1", "10", "100", "1\N{NARROW NO-BREAK SPACE}000"} <= set(re.findall(r">([^<>]+)</text>", text))
@@ -53,3 +90,18 @@ def test_a_picture_is_what_stands_in_a_source() -> None:
     kind, stored = source.split(",")
     assert kind == "data:image/webp;base64"
     assert Image.open(io.BytesIO(base64.b64decode(stored))).size == (4, 3)
+
+
+def test_a_logarithmic_axis_within_a_decade_has_numbers_and_a_longer_one_only_its_powers() -> None:
+    """Between 0.37 and 0.68 no power of ten stands; between 1 and 1000 four do."""
+
+    def labels(low: float, high: float) -> list[str]:
+        axes = Figure().subplots()
+        axes.set_yscale("log")
+        axes.set_ylim(low, high)
+        drawings.plain_numbers(axes.yaxis)
+        shown = zip(axes.yaxis.get_ticklocs(minor=True), axes.yaxis.get_ticklabels(minor=True), strict=True)
+        return [text.get_text() for at, text in shown if low <= at <= high and text.get_text()]
+
+    assert labels(0.37, 0.68) == ["0.400", "0.500", "0.600"]
+    assert labels(1, 1000) == []

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from scipy.ndimage import label
@@ -28,6 +29,17 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.
     assert estimation_page.said(found()).startswith("of curves through a few points of a fibre constant deviates least")
     assert "22 to 22 times fewer numbers" in estimation_page.said(found())
+
+
+@pytest.mark.parametrize("lacking", [("curves",), ("fits",), ("curves", "fits", "heights")])
+def test_what_was_not_measured_is_not_said(lacking, tmp_path) -> None:
+    """Of fibres of few points there are no curves, and none that deviates least."""
+    some = replace(found(), **dict.fromkeys(lacking, ()))
+    assert ("deviates least" in estimation_page.said(some)) is ("curves" not in lacking)
+    assert ("Gaussians miss" in estimation_page.said(some)) is ("fits" not in lacking)
+    assert estimation_page.said(some)
+    text = report.write(estimation_page.page(some), tmp_path / "new", "estimation").read_text()
+    assert text.count("<svg") == 4 - len({"curves", "fits"} & {*lacking})
 
 
 @pytest.mark.parametrize(("apart", "surfaces"), [(1.2, 1), (1.6, 1), (1.65, 1), (1.7, 2), (1.9, 2)])

@@ -3,12 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import small
 
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.metrics import Measure
 from fem_reference.problems import of_case
+from fem_reference.problems.setup import AttachedVertices
 from fem_reference.report.overview import case_facts, comparison_text
 from fem_reference.scenes import casefile
-from tests.report.comparisons import with_bars
+from tests.report.comparisons import html, with_bars
 
 
 def test_a_case_is_described_before_it_is_solved(tmp_path) -> None:
@@ -39,3 +43,19 @@ def test_a_doubtful_reference_is_printed_with_its_reason(comparison) -> None:
     scalars = {"negative_modes": np.array([0.0, 0, 1, 0, 0])}
     doubtful = replace(comparison, reference=replace(comparison.reference, scalars=scalars))
     assert "reference: doubtful, unstable equilibrium in 1 of 5 frames" in comparison_text(doubtful).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "metric", "said"), [(0.1, "joint_moment", 1), (None, "joint_moment", 0), (0.1, "volume", 0)]
+)
+def test_bars_of_forces_say_that_they_leave_out_how_springs_are_spread(comparison, stiffness, metric, said) -> None:
+    def with_springs(of: Comparison) -> Comparison:
+        held = AttachedVertices("foot", of.setup.bones[0], np.arange(3), stiffness)
+        return replace(of, setup=replace(of.setup, attached=(held,)))
+
+    force = Measure(metric, "force", "N", np.arange(5.0), (), (0, 10, 20, 30, 40))
+    deviations = comparison.deviations | {"quick": (*comparison.deviations["quick"], force)}
+    bars = with_springs(with_bars(replace(comparison, deviations=deviations)))
+    sentence = "5 to 9 % of a force or moment depend on how the same springs are spread"
+    assert comparison_text(bars).count(sentence) == html(bars).count(sentence) == said
+    assert sentence not in comparison_text(with_springs(comparison))

@@ -141,7 +141,7 @@ def test_a_pull_request_shows_the_worst_and_counts_the_others(count: int) -> Non
 
 
 def test_where_nothing_could_be_judged_the_reasons_stand_as_an_error() -> None:
-    lost = regression_texts.lost("ball", "mine", ["no frames", "of <anything>"])
-    error = ElementTree.fromstring(lost.junit).find("testsuite/testcase/error")
+    junit, markdown = regression_texts.lost("ball", "mine", ["no frames", "of <anything>"])
+    error = ElementTree.fromstring(junit).find("testsuite/testcase/error")
     assert (error.get("message"), error.text) == ("no frames", "no frames\nof <anything>")
-    assert lost.markdown == "### failed: mine on ball\n\n- no frames\n- of <anything>\n"
+    assert markdown == "### failed: mine on ball\n\n- no frames\n- of <anything>\n"

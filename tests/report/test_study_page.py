@@ -10,7 +10,7 @@ import pytest
 
 from fem_reference import report
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import Point, at_same_error
+from fem_reference.assessment.fronts import Point, match
 from fem_reference.assessment.recommendation import recommend
 from fem_reference.report import study_page
 from tests.assessment.test_recommendation import RMS, TIME, features, own_study
@@ -84,7 +84,7 @@ def test_each_drawing_has_the_front_of_its_own_statistic() -> None:
         curve.title: max(
             path.count("L") for path in re.findall(r'<path d="([^"]*)"[^>]*stroke-width: 1.2', curve.markup)
         )
-        for curve in study_page.front_drawings(case)
+        for curve in (study_page.front(case, error) for error in study_page.shown(case))
         if "stroke-width: 1.2" in curve.markup
     }
     assert lengths == {"Surface deviation, rms": 0, "Fibre length, rms percent": 1, "Volume, deviation": 0}
@@ -208,7 +208,7 @@ def test_at_most_means_the_same_on_the_page_of_the_study(own_bar: float) -> None
         assert recommend(known, "bar", [case], RMS, {"error": row.at}).best.point.label == cheapest.label
     for error in (0.4, 0.6, 2.9, 3.1, 4.9, 5.1, 6.9, 7.1, 9.9, 12.1):
         found = recommend(known, "bar", [case], RMS, {"error": error}).best
-        best = list(at_same_error(case.certain, RMS, TIME, error).best.values())
+        best = list(match(case.certain, RMS, TIME, same=RMS, at=error).best.values())
         assert (None if found is None else found.point.label) == (best[0].label if best else None), error
     for row in rows[TIME]:
         assert (

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fem_reference import report
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.report.tables import COLUMNS
 
 
@@ -81,6 +82,22 @@ def test_what_is_not_finite_is_null(comparison):
     assert value(printed["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
     damaged = replace(comparison.verdicts[0], word="fail", value=float("inf"))
     assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
+
+
+def test_bars_are_those_of_their_frames_and_attachments_apart(comparison):
+    numbers = comparison.reference.numbers
+    values, model = np.arange(1.0, 6.0), np.array([np.nan, 0.25, 0.5, 0.75, 1.0])
+    found = tuple(
+        ErrorBar("deviation", "surface_deviation", name, "mm", values, {"mesh": 1.0}, model=change)
+        for name, change in (("rms", model), ("max", None))
+    )
+    known = replace(comparison, error_bars=ErrorBars(numbers, (4.0, 8.0), 1.5, found))
+    rows = report.summary(known)["error_bars"]
+    wanted = dict(zip(numbers, zip(values.tolist(), [None, *model[1:].tolist()], strict=True), strict=True))
+    assert {row["frame"]: (row["value"], row["model"]) for row in rows if row["statistic"] == "rms"} == wanted
+    assert {row["frame"]: (row["value"], row["model"]) for row in rows if row["statistic"] == "max"} == {
+        number: (value, None) for number, (value, _) in wanted.items()
+    }
 
 
 def test_csv_has_the_same_numbers(comparison, tmp_path):

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_signed_distances_and_depths_are_those_of_the_runs(comparison):
-    data = json.loads(viewer.view(with_bars(comparison, 0.75)).data)
+    data = json.loads(viewer.view(with_bars(comparison, 0.75))["data"])
     assert [one["name"] for one in data["quantities"]] == ["distance", "surface", "depth"]
     assert data["bars"] == {"distance": [0, 0.75, 0.75, 0.75, None], "surface": [0, 0.375, 0.375, 0.375, None]}
     reference, quick = comparison.reference, comparison.candidates[0]
@@ -45,11 +45,11 @@ def test_fibres_and_joints_are_those_of_the_case(comparison):
     inside = replace(comparison.reference, fibres=lines, fibre_positions=lines.points * steps)
     changed = replace(comparison, reference=inside, context=replace(comparison.context, fibres=lines))
     seen = viewer.view(replace(changed, candidates=()))
-    data = json.loads(seen.data)
+    data = json.loads(seen["data"])
     assert data["fibres"] == {"lines": [3, 2], "rest": [2, 2, 1], "low": 1.0, "high": pytest.approx(1.4)}
-    assert seen.stretches[0] == (0.0, 1.0)
+    assert seen["stretches"][0] == (0.0, 1.0)
     points = positions({"positions": data["runs"][0]["points"]}, data, 5)
-    assert points == pytest.approx(inside.fibre_positions, abs=seen.error + 1e-12)
+    assert points == pytest.approx(inside.fibre_positions, abs=seen["error"] + 1e-12)
     (joint,) = data["joints"]
     assert (joint["name"], joint["unit"]) == ("plate", "°")
     assert joint["values"] == pytest.approx(np.degrees([0, 0.25, 0.5, 0.75, 1]), abs=0.01)

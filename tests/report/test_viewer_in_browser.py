@@ -77,7 +77,7 @@ def body_of_reference(picture: np.ndarray) -> np.ndarray:
 
 def test_the_slider_moves_the_mesh(opened, comparison):
     seen = viewer.view(comparison)
-    error, half = seen.error, json.loads(seen.data)["camera"]["half"]
+    error, half = seen["error"], json.loads(seen["data"])["camera"]["half"]
     click(opened, "bones")
     opened.ask("document.getElementById('viewer-slider').focus()")
     middles = []

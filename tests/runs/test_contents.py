@@ -1,14 +1,23 @@
 """The contents of run.json: read strictly, so that each damage is named."""
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.runs import store
 from fem_reference.runs.contents import amend, frame_file
 from tests.runs.stored import write
+
+SCALARS = {
+    f"{kind}_on_femur_{axis}": np.full(2, 2.0 * (kind + axis == "forcex"))
+    for kind in ("force", "moment")
+    for axis in "xyz"
+}
 
 
 def test_damage_is_named(tmp_path) -> None:
@@ -57,3 +66,16 @@ def test_frames_between_whole_numbers_share_no_file() -> None:
     assert frame_file(10.0, ".vtp") == frame_file(10, ".vtp") == "frame_0010.vtp"
     with pytest.raises(ValueError, match=r"frame 0\.2, which is no whole number, has no file"):
         frame_file(0.2, ".vtp")
+
+
+@pytest.mark.parametrize(
+    "centre",
+    [(1, 2), (0, 0, math.nan), (0, 0, math.inf), "1, 2, 3 mm", None, Path("x"), [[0, 0, 0]], (0, 0, 10**400), []],
+)
+def test_a_moment_is_about_a_point(centre, tmp_path) -> None:
+    """Not-a-number for a centre would make every moment one, and a row of points another question."""
+    pulled = replace(store.load(write(tmp_path / "run")), scalars=SCALARS)
+    with pytest.raises(InputError, match=r"centre: got .*, want a point: three finite numbers \[mm\]"):
+        pulled.moment("femur", centre)
+    # 2 N along x at the origin, whose moment is 0, has about (0, 0, 3) mm one of -6 N mm along y.
+    assert pulled.moment("femur", np.array([0, 0, 3])).tolist() == [[0.0, -6.0, 0.0]] * 2

@@ -140,6 +140,60 @@ def test_a_penalty_on_volume_change_is_a_pressure() -> None:
     assert stress == pytest.approx(np.tile(BULK * (1.1**3 - 1) * np.eye(3), (40, 1, 1)), rel=1e-11)
 
 
+def test_energies_of_effects_are_their_densities_times_the_volume() -> None:
+    """``mu/2 (l^2 + 2/l - 3)`` of incompressible neo-Hooke (Rivlin 1948); half of an effect with a ramp; contact has none."""
+    stretch, volume = 1.3, 4.0 * 6 * 8
+    state = moved(affine(np.diag([stretch, stretch**-0.5, stretch**-0.5])))
+    effects = (NEO_HOOKE, make("active_tension"), make("contact"))
+    found = Results(MESH, effects, {30.0: state}, FIBRES).energies(30.0)
+    assert set(found) == {"neo_hooke", "active_tension"}
+    along = np.sum((np.array([stretch, stretch**-0.5, stretch**-0.5]) * FIBRE) ** 2)
+    assert found["active_tension"] == pytest.approx(volume * 0.5 * 0.06 / 2 * (along - 1), rel=1e-12)
+    assert found["neo_hooke"] == pytest.approx(volume * MU / 2 * (stretch**2 + 2 / stretch - 3), rel=1e-12)
+    assert set(Results(MESH, (*MATRIX, NEO_HOOKE), {30.0: state}).energies(30.0)) == {"neo_hooke", "incompressible"}
+    twice = Results(MESH, (NEO_HOOKE, NEO_HOOKE), {30.0: state}).energies(30.0)
+    assert twice["neo_hooke"] == pytest.approx(2 * found["neo_hooke"], rel=1e-12)
+
+
+def test_an_energy_that_varies_is_integrated() -> None:
+    """With ``u = b x^2`` along x, J = 1 + 2 b x, and a penalty ``K/2 (J - 1)^2`` integrates to ``2 K b^2 X^2 / 3`` per volume."""
+    b, bulk = 0.01, 10.0
+    bent = moved(lambda X: np.stack([b * X[..., 0] ** 2, 0 * X[..., 0], 0 * X[..., 0]], axis=-1))
+    state = replace(bent, pressure=np.zeros((len(MESH.tets), 0)))
+    found = Results(MESH, (make("incompressible_penalty"),), {0.0: state}).energies(0.0)
+    assert found["incompressible_penalty"] == pytest.approx(4.0 * 6 * 8 * 2 / 3 * bulk * (b * 4) ** 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("angle", [1.3, 2.0, 2.8])
+def test_fibres_by_their_energy_have_the_arm_of_their_excursion(angle: float) -> None:
+    """A bar between a fixed point and one that turns, 40 and 30 mm from a hinge, is stretched evenly along its fibres.
+
+    Their moment, minus the slope of their energy, over their tension is ``-a b sin(t) / l``, minus the slope of their length, to
+    rounding of differences. The matrix pulls on the same line, so it has the same arm, and so have both together.
+    """
+    a, b, rest, step = 40.0, 30.0, 45.0, 1e-5
+    fibre = np.tile([0.0, 0, 1], (len(MESH.tets), 1))
+
+    def length(at: float) -> float:
+        return float(np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(at)))
+
+    def energies(at: float) -> dict[str, float]:
+        across = (length(at) / rest) ** -0.5
+        state = moved(affine(TURN @ np.diag([across, across, across**-2])))
+        return Results(MESH, (NEO_HOOKE, make("fibre_passive")), {0.0: state}, fibre).energies(0.0)
+
+    low, high = energies(angle - step), energies(angle + step)
+    moments = {name: -(high[name] - low[name]) / (2 * step) for name in low}
+    stretch, section = length(angle) / rest, 4.0 * 6 * 8 / rest
+    law = FibrePassive(0.3, 0.05, 6.6, 1.1, 1.4)
+    forces = {"neo_hooke": section * MU * (stretch - stretch**-2), "fibre_passive": section * law.slope(stretch)}
+    arm = -a * b * np.sin(angle) / length(angle)
+    for name, force in forces.items():
+        assert moments[name] == pytest.approx(force * arm, rel=1e-6)
+    assert (forces["fibre_passive"] > 0) == (angle > 1.5)  # slack in the first pose
+    assert sum(moments.values()) / sum(forces.values()) == pytest.approx(arm, rel=1e-6)
+
+
 def test_viscosity_resists_the_rate_of_a_small_step() -> None:
     # sigma = 2 eta D to first order in the step; weight and drag have no stress.
     rate, step = 4.0, np.array([[1e-6, 2e-6, 0], [0, -1e-6, 3e-6], [1e-6, 0, 0]])

@@ -112,7 +112,9 @@ def test_via_points_go_with_their_bones() -> None:
 def test_around_a_sphere_it_is_as_long_as_the_closed_form(radius) -> None:
     # Two ends 15 mm off the centre, opposite each other: tangents of sqrt(d^2 - r^2) and r (pi - 2 acos(r / d)).
     given = bar(motion=None, points=2001)
-    outcome, frames = solved(given, sphere={"bone": "top", "centre": "5, 5, 15 mm", "radius": f"{radius} mm"})
+    outcome, frames = solved(
+        given, obstacle=[{"bone": "top", "sphere": {"centre": "5, 5, 15 mm", "radius": f"{radius} mm"}}]
+    )
     assert outcome.message == "2 lines, straight or around the sphere on top; no surface"
     exact = 2 * math.sqrt(225 - radius**2) + radius * (math.pi - 2 * math.acos(radius / 15))
     found = lengths(given, frames)
@@ -121,7 +123,7 @@ def test_around_a_sphere_it_is_as_long_as_the_closed_form(radius) -> None:
     assert np.linalg.norm(frames[0].fibres - [5, 5, 15], axis=1).min() > radius - 1e-9
     # Points fewer than that lose length, and the frame says how much.
     coarse = bar(motion=None, points=11)
-    _, few = solved(coarse, sphere={"bone": "top", "centre": "5, 5, 15 mm", "radius": f"{radius} mm"})
+    _, few = solved(coarse, obstacle=[{"bone": "top", "sphere": {"centre": "5, 5, 15 mm", "radius": f"{radius} mm"}}])
     assert_allclose(few[0].scalars["lost_by_chords_max"], exact - coarse.fibres.lengths(few[0].fibres)[0], rtol=1e-9)
     assert 1e-3 < few[0].scalars["lost_by_chords_max"] < 0.5
 
@@ -129,8 +131,12 @@ def test_around_a_sphere_it_is_as_long_as_the_closed_form(radius) -> None:
 @pytest.mark.parametrize(
     "obstacle",
     [
-        {"sphere": {"bone": "bottom", "centre": "5, 8, 15 mm", "radius": "6 mm"}},
-        {"cylinder": {"bone": "bottom", "start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}},
+        {"obstacle": [{"bone": "bottom", "sphere": {"centre": "5, 8, 15 mm", "radius": "6 mm"}}]},
+        {
+            "obstacle": [
+                {"bone": "bottom", "cylinder": {"start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}}
+            ]
+        },
         {"via": [{"at": 0.4, "bone": "bottom"}]},
         {},
     ],
@@ -140,14 +146,14 @@ def test_what_moves_as_a_whole_keeps_its_lengths(obstacle) -> None:
     _, frames = solved(given, **obstacle)
     for frame in frames[1:]:
         assert_allclose(frame.fibres, apply(SWING.pose(frame.number), frames[0].fibres), atol=1e-10)
-    assert (frames[0].scalars["lost_by_chords_max"] > 1e-6) == ("sphere" in obstacle or "cylinder" in obstacle)
+    assert (frames[0].scalars["lost_by_chords_max"] > 1e-6) == ("obstacle" in obstacle)
 
 
 def test_a_cylinder_is_wrapped_where_the_line_comes_to_it() -> None:
     """A cylinder beside the lines, of which one is pulled over: straight before, longer than straight after."""
     given = bar(RigidMotion((0, 1, 0), None, (0.0, 10.0), (0.0, 20.0)))
-    roll = {"bone": "bottom", "start": "0, 14, 15 mm", "end": "10, 14, 15 mm", "radius": "5 mm"}
-    outcome, frames = solved(given, cylinder=roll)
+    roll = {"bone": "bottom", "cylinder": {"start": "0, 14, 15 mm", "end": "10, 14, 15 mm", "radius": "5 mm"}}
+    outcome, frames = solved(given, obstacle=[roll])
     assert outcome.message == "2 lines, straight or around the cylinder on bottom; no surface"
     straight, wrapped = lengths(given, solved(given)[1]), lengths(given, frames)
     assert_allclose(wrapped[0], straight[0], rtol=1e-13)
@@ -169,33 +175,47 @@ def test_cost() -> None:
 
 
 def test_an_end_inside_an_obstacle_is_refused_at_rest_and_an_outcome_later() -> None:
-    inside = {"bone": "bottom", "centre": "5, 5, 28 mm", "radius": "4 mm"}
-    with pytest.raises(InputError, match=r"sphere: got a fixed point of line 0 2 mm inside, want an obstacle with all"):
-        solved(bar(), sphere=inside)
+    inside = {"centre": "5, 5, 28 mm", "radius": "4 mm"}
+    with pytest.raises(
+        InputError, match=r"obstacle\[0\]: got a fixed point of line 0 2 mm inside, want an obstacle with all"
+    ):
+        solved(bar(), obstacle=[{"bone": "bottom", "sphere": inside}])
     down = RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 20.0))
-    outcome, frames = solved(bar(down), sphere=inside | {"centre": "5, 5, 12 mm"})
+    outcome, frames = solved(bar(down), obstacle=[{"bone": "bottom", "sphere": inside | {"centre": "5, 5, 12 mm"}}])
     assert outcome.status == "diverged"
     assert outcome.message == "frame 10: a fixed point of line 0 2 mm inside; a smaller radius may help"
     assert [frame.number for frame in frames] == [0, 5]
 
 
-BALL = {"bone": "top", "centre": "5, 5, 15 mm", "radius": "4 mm"}
-ROLL = {"bone": "top", "start": "0, 0, 0 mm", "end": "0, 0, 1 mm", "radius": "4 mm"}
+BALL = {"centre": "5, 5, 15 mm", "radius": "4 mm"}
+ROLL = {"start": "0, 0, 0 mm", "end": "0, 0, 1 mm", "radius": "4 mm"}
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"via": [{"at": 0.5, "bone": "skull"}]}, r'via\[0\]\.bone: got "skull", want one of bottom, top'),
-        ({"sphere": BALL | {"bone": "skull"}}, r'sphere\.bone: got "skull", want one of bottom, top'),
-        ({"cylinder": ROLL | {"bone": "skull"}}, r'cylinder\.bone: got "skull", want one of bottom, top'),
-        ({"sphere": BALL, "cylinder": ROLL}, 'at most one of "sphere", "cylinder", "obstacle"'),
+        (
+            {"obstacle": [{"bone": "skull", "sphere": BALL}]},
+            r'obstacle\[0\]\.bone: got "skull", want one of bottom, top',
+        ),
+        (
+            {"obstacle": [{"bone": "skull", "cylinder": ROLL}]},
+            r'obstacle\[0\]\.bone: got "skull", want one of bottom, top',
+        ),
+        (
+            {"obstacle": [{"bone": "top", "sphere": BALL, "cylinder": ROLL}]},
+            'one of "sphere", "cylinder", "ellipsoid", "torus"',
+        ),
         (
             {"via": [{"at": 0.5, "bone": "top"}, {"at": 0.5, "bone": "top"}]},
             "in the order in which a fibre passes them",
         ),
         ({"via": [{"at": 1.0, "bone": "top"}]}, r"via\[0\]\.at: got 1\.0, want less than 1"),
-        ({"sphere": BALL | {"radius": "0 mm"}}, r'sphere\.radius: got "0 mm", want more than zero'),
+        (
+            {"obstacle": [{"bone": "top", "sphere": BALL | {"radius": "0 mm"}}]},
+            r'sphere\.radius: got "0 mm", want more than zero',
+        ),
     ],
 )
 def test_settings_that_are_refused(settings, message) -> None:
@@ -220,7 +240,7 @@ solver = "line_of_action"
 [[candidate]]
 name = "around"
 solver = "line_of_action"
-sphere = { bone = "floor", centre = "5, 5, 20 mm", radius = "3 mm" }
+obstacle = [{ bone = "floor", sphere = { centre = "5, 5, 20 mm", radius = "3 mm" } }]
 
 [[candidate]]
 name = "springs"
@@ -258,7 +278,7 @@ def scene(folder: Path) -> Path:
     return folder
 
 
-SPHERE = 'name = "line"\nsphere = {{ bone = "{}", centre = "{}", radius = "6 mm" }}\n'
+SPHERE = 'name = "line"\nobstacle = [{{ bone = "{}", sphere = {{ centre = "{}", radius = "6 mm" }} }}]\n'
 MULTIGRID_ON_TWO_RANKS = 'name = "line"\nsolver = "fenicsx"\nranks = 2\nlinear_solver = "multigrid"'
 SPHERE_ON_NOTHING, SPHERE_AROUND_THE_END = SPHERE.format("skull", "5, 5, 20 mm"), SPHERE.format("lid", "5, 5, 40 mm")
 
@@ -325,7 +345,7 @@ def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> No
     ("old", "new", "message"),
     [
         ('name = "line"\n', 'name = "line"\nvia = [{ at = 0.5, bone = "skull" }]\n', 'via[0].bone: got "skull", want one of'),
-        ('name = "line"\n', SPHERE_ON_NOTHING, 'sphere.bone: got "skull", want one of floor, lid'),
+        ('name = "line"\n', SPHERE_ON_NOTHING, 'obstacle[0].bone: got "skull", want one of floor, lid'),
         ('name = "line"\n', SPHERE_AROUND_THE_END, "an obstacle with all of them outside"),
         ('name = "line"\nsolver = "line_of_action"', MULTIGRID_ON_TWO_RANKS, "ranks: got 2, want 1"),
     ],
@@ -436,8 +456,8 @@ OBSTACLES = [
     {},
     {"via": [{"at": 0.3, "bone": "top"}, LEFT_OUT, {"at": 0.6, "bone": "top"}]},
     {"via": [{"at": 0.3, "bone": "top"}, {"at": 0.6, "bone": "bottom"}]},
-    {"sphere": {"bone": "bottom", "centre": "5, 8, 15 mm", "radius": "6 mm"}},
-    {"cylinder": {"bone": "top", "start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}},
+    {"obstacle": [{"bone": "bottom", "sphere": {"centre": "5, 8, 15 mm", "radius": "6 mm"}}]},
+    {"obstacle": [{"bone": "top", "cylinder": {"start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}}]},
     {"obstacle": [{"bone": "bottom", "ellipsoid": EGG}]},
     {"obstacle": [{"bone": "top", "torus": RING}]},
     {

@@ -166,7 +166,7 @@ def test_around_a_sphere(on_body, radius) -> None:
     ball.set_radius(radius)
     ball.set_translation(opensim.Vec3(7, 6, 14))
     bone = "top" if on_body else "bottom"
-    found = ours({"sphere": {"bone": bone, "centre": "7, 6, 14 mm", "radius": f"{radius} mm"}})
+    found = ours({"obstacle": [{"bone": bone, "sphere": {"centre": "7, 6, 14 mm", "radius": f"{radius} mm"}}]})
     agree(found, theirs(wraps=[(ball, on_body)]))
 
 
@@ -179,8 +179,8 @@ def around_a_cylinder(on_body: bool, rise: float) -> tuple[np.ndarray, np.ndarra
     # Its axis is its third; turned about the second by a quarter it is the first.
     roll.set_xyz_body_rotation(opensim.Vec3(0, math.pi / 2 + math.atan2(rise, 3), 0))
     bone = "top" if on_body else "bottom"
-    rod = {"bone": bone, "start": "7, 6, 14 mm", "end": f"10, 6, {14 - rise} mm", "radius": "6 mm"}
-    return ours({"cylinder": rod}), theirs(wraps=[(roll, on_body)])
+    rod = {"start": "7, 6, 14 mm", "end": f"10, 6, {14 - rise} mm", "radius": "6 mm"}
+    return ours({"obstacle": [{"bone": bone, "cylinder": rod}]}), theirs(wraps=[(roll, on_body)])
 
 
 @pytest.mark.parametrize("on_body", [False, True])

@@ -47,7 +47,7 @@ def test_a_rod_stretched_by_s_has_its_radius_over_the_root_of_s() -> None:
     model, frames = solved(bar(high=PULL), iterations=400)
     # The volume pi r^2 l is that of rest, with l 1.21 times as long in every segment.
     assert_allclose(model.radii, model.radius / 1.1, rtol=1e-6)
-    assert_allclose(np.diff(model.points[..., 2], axis=1), 1.21 * LENGTH / 8, rtol=1e-6)
+    assert_allclose(np.diff(model.rods[..., 2], axis=1), 1.21 * LENGTH / 8, rtol=1e-6)
     assert frames[-1].scalars["rod_volume_min"] == pytest.approx(1, abs=1e-9)
     # Half way between two rods' points the surface is as much nearer to the rod.
     middle = np.flatnonzero(np.isclose(model.problem.surface.points[:, 2], LENGTH / 2))
@@ -65,7 +65,7 @@ def test_rods_have_the_volume_of_the_muscle(rods) -> None:
     given = bar(rods=rods)
     model = viper.Rods(given, viper.ViperSettings(**USUAL))
     inside = enclosed_volume(given.surface.points, given.surface.triangles)
-    assert volumes(model.points, model.radii).sum() == pytest.approx(inside, rel=1e-12)
+    assert volumes(model.rods, model.radii).sum() == pytest.approx(inside, rel=1e-12)
     assert inside == pytest.approx(3000)
 
 
@@ -82,7 +82,7 @@ def test_a_twisted_rod_turns_evenly_along_its_length() -> None:
     angles = 2 * np.arctan2(model.turns[0, :, 3], model.turns[0, :, 0])
     # Eight segments between bones turned by 0 and 1 rad: the torque is the same everywhere.
     assert_allclose(angles, np.linspace(0, 1, 10), atol=1e-6)
-    assert_allclose(model.points[0, :, :2], 5, atol=1e-9)
+    assert_allclose(model.rods[0, :, :2], 5, atol=1e-9)
 
 
 def test_without_bending_frames_follow_their_segments_alone() -> None:
@@ -102,7 +102,7 @@ def test_a_bent_rod_is_symmetric() -> None:
     """Both ends turned in opposite directions about the middle of the rod, which is in the plane of symmetry."""
     one, other = (RigidMotion((1, 0, 0), (5, 5, z), (0.0, 10.0), (0.0, turn)) for z, turn in ((0, 0.4), (LENGTH, -0.4)))
     model, _ = solved(bar(one, other), iterations=400)
-    points = model.points[0] - [5, 5, LENGTH / 2]
+    points = model.rods[0] - [5, 5, LENGTH / 2]
     assert_allclose(points[::-1] * [1, 1, -1], points, atol=1e-6)
     assert abs(points[4, 1]) > 0.5
     tangents = turned(model.turns[0, 1:-1], np.tile([0.0, 0.0, 1.0], (8, 1)))
@@ -113,8 +113,8 @@ def test_a_bundle_gets_thinner_as_its_rods_do() -> None:
     wide = {}
     for bundle in (0.0, 1.0):
         model, _ = solved(bar(high=PULL, rods=16), iterations=100, bundle=bundle)
-        wide[bundle] = np.ptp(model.points[:, 4, 0])
-        assert_allclose(volumes(model.points, model.radii), model.volumes, rtol=0.05)
+        wide[bundle] = np.ptp(model.rods[:, 4, 0])
+        assert_allclose(volumes(model.rods, model.radii), model.volumes, rtol=0.05)
     assert wide[0.0] == pytest.approx(8)
     # Its ends are as wide as at rest, so that sections between them are stretched a little more than the whole.
     assert wide[1.0] == pytest.approx(8 / 1.1, rel=0.01)
@@ -188,7 +188,7 @@ def test_a_start_at_one_point_is_no_exception_and_neither_is_what_is_no_number()
     outcome = viper.solve(given, viper.ViperSettings(**USUAL), list[object]().append)
     assert outcome.status == "converged"
     model, number = viper.Rods(bar(), viper.ViperSettings(**USUAL)), 1
-    model.points[0, 3] = np.nan
+    model.rods[0, 3] = np.nan
     model.move(number)
     found = model.trouble()
     assert found is not None

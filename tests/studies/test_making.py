@@ -170,7 +170,7 @@ def test_a_run_that_was_watched_to_its_end_is_not_watched_again(tmp_path, monkey
     assert bench.watch().frames == {}
     assert not any(making.seen(bench.watch(), run.folder, run.numbers[:3]))  # of one that was cut off
     assert tuple(bench.watch().frames) == run.numbers[:3]
-    assert all(one.stresses.acts == pytest.approx(0, abs=1e-12) for one in bench.watch().frames.values())
+    assert all(sizes.acts == pytest.approx(0, abs=1e-12) for _, sizes in bench.watch().frames.values())
 
 
 @pytest.mark.slow

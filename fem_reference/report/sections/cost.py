@@ -22,7 +22,7 @@ _BY_FRAME = {
 
 
 def facts(comparison: Comparison) -> dict[str, Any]:
-    """The kinds of cost, and what each frame of the reference took."""
+    """The kinds of cost, and the cost of each frame of the reference."""
     reference = comparison.reference
     by_frame = {title: reference.scalars[name] for name, title in _BY_FRAME.items() if name in reference.scalars}
     return {"costs": _costs(comparison), "by_frame": by_frame, "frame_costs": _drawn(reference)}

@@ -3,24 +3,24 @@
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import TET_FACES, Floats, Polylines, Surface, TetMesh, diagonal
 from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.resolved_paths import posed, skipped
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble, surface_checks
+from fem_reference.scenes.muscle import MOST_FRAMES
+from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 
 # Fractions of a frame at which motions are sampled; a bone that turns too far between these also does between finer ones.
 _PARTS = 16
-# Positions (n, 3) [mm], the stored part of their velocities (n, 3), and the frame number -> both after its iteration.
-Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 
 
 class FrameModel(Protocol):
@@ -52,6 +52,9 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
     parts; the model sees the bones at their ends. ``sink`` gets the frames. *Out of steps* where bones move too far in between.
     """
     frames = setup.frames
+    if frames[-1] - frames[0] > MOST_FRAMES:
+        want = f"at most {MOST_FRAMES} frame numbers after the first, as this solver goes through each"
+        raise InputError("frames.last", f"{frames[-1]}, {frames[-1] - frames[0]} after the first", want)
     if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
         return refused(model, frames[0], sink, why)
     sink(model.frame(frames[0]))
@@ -107,16 +110,19 @@ def _begun(model: FrameModel) -> dict[str, float]:
     return cost
 
 
-def timed[M: FrameModel](make: Callable[[Setup], M], setup: Setup) -> M:
-    """The model that ``make`` builds from ``setup``, with its ``seconds_setup`` in the cost. First it solves one frame of a
-    tetrahedron, which calls every compiled function, in ``seconds_compile``.
+def timed[M: FrameModel, S: Record](
+    make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
+) -> M:
+    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. First it solves one
+    frame of a tetrahedron, with ``quick`` settings where there are some: this calls every compiled function, in
+    ``seconds_compile``.
     """
     begin = time.perf_counter()
-    first = make(tetrahedron())
+    first = make(tetrahedron(), quick or settings)
     first.move(1)
     first.frame(1)
     compiled = time.perf_counter()
-    model = make(setup)
+    model = make(setup, settings)
     model.cost["seconds_compile"] = compiled - begin
     model.cost["seconds_setup"] = time.perf_counter() - compiled
     return model
@@ -130,41 +136,23 @@ def tetrahedron() -> MuscleProblem:
     bone = Bone("bone", surface, None, solid=clear)
     attached = (AttachedVertices("end", bone, np.zeros(1, np.int64)),)
     mesh, fibre = TetMesh(corners, np.arange(4)[None], facets), Polylines(corners[:2], np.array([0, 2]))
-    return MuscleProblem(
-        surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre, mesh_facts={}, seconds=0.0
-    )
+    return MuscleProblem(surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre)
 
 
-@dataclass(eq=False)
 class MovingSurface:
-    """A surface of particles as the model of a muscle, advanced by ``iterate``. An iteration projects ``projections``
-    constraints, those of contact not counted.
-    """
+    """The surface of a muscle going from frame number to frame number, with its vertices at ``points`` (n, 3) [mm]."""
 
-    setup: Setup
-    iterate: Iterate
-    projections: int = 0
-    advice: str = "a slower motion, more steps or a lower stiffness may help"
-    cost: dict[str, float] = field(default_factory=dict)
-    points: Floats = field(init=False)
-    kept: Floats = field(init=False)
-    checks: tuple[StateCheck, ...] = field(init=False)
+    advice = "a slower motion, more steps or a lower stiffness may help"
 
-    def __post_init__(self) -> None:
-        self.points = self.setup.begin(self.setup.surface.points)
-        self.kept = np.zeros(self.points.shape)
-        self.checks = surface_checks(self.setup.surface, self.setup.attached_vertices)
-        free = len(self.points) - len(np.unique(self.setup.attached_vertices))
-        self.cost |= {"unknowns": 3.0 * free, "projections": 0.0}
-
-    def move(self, number: int) -> None:
-        """Run one iteration."""
-        self.points, self.kept = self.iterate(self.points, self.kept, number)
-        self.cost["projections"] += self.projections
+    def __init__(self, setup: Setup) -> None:
+        self.setup, self.points = setup, setup.begin(setup.surface.points)
+        self.check = SurfaceCheck(setup.surface, setup.attached_vertices)
+        free = len(self.points) - len(np.unique(setup.attached_vertices))
+        self.cost: dict[str, float] = {"unknowns": 3.0 * free}
 
     def trouble(self) -> Trouble | None:
         """The trouble with the surface; None without."""
-        return first_trouble(self.checks, self.points)
+        return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
         """The surface."""

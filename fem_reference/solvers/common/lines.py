@@ -113,7 +113,7 @@ class Lines:
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
-    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` where it has not what they need."""
+    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` where it lacks what they need."""
     fibres, evenly = problem.fibres, (np.arange(spread) + 0.5) / max(spread, 1)
     places = (0.0, *(via.at for via in vias), *evenly.tolist(), 1.0)
     named = [index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(vias)]
@@ -169,7 +169,7 @@ def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
 
 
 def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) -> int:
-    """The index of what has this ``name``; InputError at ``place`` where nothing has."""
+    """The index of the item with this ``name``; InputError at ``place`` where there is none."""
     names = [one.name for one in named]
     if name not in names:
         raise InputError(

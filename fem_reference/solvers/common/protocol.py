@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Record
@@ -16,38 +16,16 @@ from fem_reference.runs.writer import CutOff
 Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
-class Solve[P, S: Record](Protocol):
-    """Solves problems of one type."""
-
-    def __call__(self, problem: P, settings: S, sink: Sink, /) -> Outcome:
-        """Sink every requested frame as it is reached. A physical failure is a status with a sentence, never an exception;
-        earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
-        """
-
-
-class GoOn[P, S: Record](Protocol):
-    """Continues problems from the frame at which a run was cut off."""
-
-    def __call__(self, problem: P, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
-        """Solve as ``Solve`` does, from the last stored frame with enough state, which need not be the last of all, else from the
-        first; it ends as the run would have ended.
-        """
-
-
-class CheckEffects[S: Record](Protocol):
-    """Checks settings against effects."""
-
-    def __call__(self, settings: S, effects: tuple[Effect, ...], place: str, /) -> None:
-        """Raise InputError below ``place`` where the settings do not suit the effects of a scene."""
-
-
-class CheckProblem[S: Record](Protocol):
-    """Checks settings against the problem of a case."""
-
-    def __call__(self, settings: S, problem: Any, place: str, /) -> None:
-        """Raise InputError below ``place`` where the settings do not suit the bones, attachments, fibres or boundary of a
-        case.
-        """
+# Solves a problem of one type: sinks every requested frame as it is reached. A physical failure is a status with a sentence, never
+# an exception; earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
+type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
+# Solves so from the last stored frame with enough state, which need not be the last of all, else from the first; ends as the run
+# would have ended that was cut off.
+type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
+# Raises InputError below a place where the settings do not suit the effects of a scene.
+type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
+# Raises InputError below a place where the settings do not suit the bones, attachments, fibres or boundary of a case.
+type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
 class TableRow(NamedTuple):
@@ -88,7 +66,9 @@ class Solver[P, S: Record]:
 
     def run(self, problem: P, settings: S) -> Run:
         """The run of a problem, in memory."""
-        return solved(self.solve, problem, settings)
+        frames: list[Frame] = []
+        outcome = self.solve(problem, settings, frames.append)
+        return collected(frames, outcome)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +107,6 @@ class BodySolver[S: Record](Solver[Body, S]):
 
 
 AnySolver = Solver[Any, Any]
-
-
-def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:
-    """The run of a problem, in memory."""
-    frames: list[Frame] = []
-    outcome = solve(problem, settings, frames.append)
-    return collected(frames, outcome)
 
 
 @dataclass(frozen=True)

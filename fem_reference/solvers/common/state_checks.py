@@ -37,49 +37,26 @@ def first_trouble(checks: Iterable[StateCheck], state: Floats) -> Trouble | None
     return next((found for check in checks if (found := check.trouble(state)) is not None), None)
 
 
-class Finite:
-    """Checks that all positions are numbers."""
-
-    def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged where a position is not a number."""
-        lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
-        if len(lost) == 0:
-            return None
-        return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
-
-
-class Width:
-    """Checks that no surface spreads much wider than at ``rest``, or than its ``attached`` vertices (k,)."""
-
-    def __init__(self, rest: Surface, attached: Ints) -> None:
-        self.attached, self.at_rest = attached, diagonal(rest.points)
-
-    def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged where the box around the surface is too large."""
-        wide, between = diagonal(state), diagonal(state[self.attached]) if len(self.attached) else 0.0
-        if wide <= _WIDE * max(self.at_rest, between):
-            return None
-        return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {self.at_rest:.3g} mm")
-
-
-class Volume:
-    """Checks that no surface is turned inside out, or encloses much more than at ``rest``."""
+class SurfaceCheck:
+    """Checks that a closed surface, with ``attached`` vertices (k,), can be a muscle that had the shape of ``rest``."""
 
     def __init__(self, rest: Surface, attached: Ints) -> None:
         self.rest, self.attached = rest, attached
-        self.at_rest = enclosed_volume(rest.points, rest.triangles)
+        self.width, self.volume = diagonal(rest.points), enclosed_volume(rest.points, rest.triangles)
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """Inverted where it is turned inside out, diverged where it is too large."""
-        ratio = enclosed_volume(state, self.rest.triangles) / self.at_rest
+        """Diverged where a position is not a number, or the surface is much wider or larger than at rest and than its attached
+        vertices are apart; inverted where it is turned inside out.
+        """
+        lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
+        if len(lost):
+            return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
+        wide, apart = diagonal(state), diagonal(state[self.attached]) if len(self.attached) else 0.0
+        if wide > _WIDE * max(self.width, apart):
+            return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {self.width:.3g} mm")
+        ratio = enclosed_volume(state, self.rest.triangles) / self.volume
         if ratio <= 0:
             return Trouble("inverted", "the surface is turned inside out")
-        between = diagonal(state[self.attached]) if len(self.attached) else 0.0
-        if ratio <= _LARGE * max(1, between / diagonal(self.rest.points)):
-            return None
-        return Trouble("diverged", f"the surface encloses {ratio:.3g} times its volume at rest")
-
-
-def surface_checks(rest: Surface, attached: Ints) -> tuple[StateCheck, ...]:
-    """The checks of a closed surface with ``attached`` vertices (k,), in order: without positions there is no volume."""
-    return Finite(), Width(rest, attached), Volume(rest, attached)
+        if ratio > _LARGE * max(1, apart / self.width):
+            return Trouble("diverged", f"the surface encloses {ratio:.3g} times its volume at rest")
+        return None

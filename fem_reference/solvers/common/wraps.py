@@ -1,4 +1,4 @@
-"""Obstacles on bones that lines go around: their settings, the paths around them, and what is inside them."""
+"""Obstacles on bones that lines go around: their settings, the paths around them, and points inside them."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -9,12 +9,12 @@ from pydantic import BeforeValidator, model_validator
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join, one_of
 from fem_reference.foundations.units import Point, PositiveLength, three
+from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
-from fem_reference.geometry.winding import Winding, around
-from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, straight
+from fem_reference.geometry.winding import Winding
+from fem_reference.geometry.wrapping import Paths
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
@@ -83,30 +83,28 @@ class ObstacleOn(Record):
 
 @dataclass(frozen=True, eq=False)
 class Wraps:
-    """The obstacles ``given`` on ``bones`` and their ``surfaces`` at rest; a sphere or a cylinder alone has a closed form."""
+    """The obstacles ``given`` on ``bones``; a sphere or a cylinder alone has a closed form."""
 
     given: tuple[ObstacleOn, ...]
     bones: tuple[Bone, ...]
-    surfaces: tuple[Quadric | Ring, ...]
 
     def around(self, fixed: Floats, number: int) -> Paths | Winding:
         """The shortest paths of all parts of lines through the points ``fixed`` (k, q + 1, 3), line by line, at a frame."""
         starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
         if not self.given:
-            return straight(starts, ends)
-        if len(self.given) > 1 or (closed := _closed(self.given[0])) is None:
-            return around(self._moved(number), starts, ends)
-        pose = self.bones[0].pose(number)
-        back = np.linalg.inv(pose)
-        return closed.around(apply(back, starts), apply(back, ends)).moved(pose)
+            return wrapping.straight(starts, ends)
+        moved = self._moved(number)
+        if len(moved) == 1 and isinstance(moved[0], Quadric) and self.given[0].name in ("sphere", "cylinder"):
+            return wrapping.around(moved[0], starts, ends)
+        return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The obstacle that has a fixed point deepest inside, and how deep of which line; empty where none is inside."""
+        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty where none is inside."""
         found = []
-        for one, surface in zip(self.given, self._moved(number), strict=True):
+        for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)
             depths = np.linalg.norm(surface.pushed(points) - points, axis=1).reshape(len(fixed), -1).max(axis=1)
-            found.append((float(depths.max()), int(depths.argmax()), one.name))
+            found.append((float(depths.max()), int(depths.argmax()), f"obstacle[{i}]"))
         depth, line, name = max(found, default=(0.0, 0, ""))
         return (name, f"a fixed point of line {line} {depth:.3g} mm inside") if depth > _TOUCHES else ("", "")
 
@@ -114,24 +112,13 @@ class Wraps:
         return " and ".join(f"the {one.name} on {one.bone}" for one in self.given)
 
     def _moved(self, number: int) -> list[Quadric | Ring]:
-        return [one.moved(bone.pose(number)) for one, bone in zip(self.surfaces, self.bones, strict=True)]
+        return [one.surface().moved(bone.pose(number)) for one, bone in zip(self.given, self.bones, strict=True)]
 
 
-def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], places: list[str]) -> Wraps:
-    """The obstacles of a muscle; InputError at one of ``places`` where there is no such bone."""
-    pairs = zip(given, places, strict=True)
-    bones = tuple(problem.bones[index(problem.bones, one.bone, join(place, "bone"))] for one, place in pairs)
-    return Wraps(given, bones, tuple(one.surface() for one in given))
-
-
-def _closed(given: ObstacleOn) -> WrappingSphere | WrappingCylinder | None:
-    """An obstacle at rest around which paths have a closed form."""
-    if (ball := given.sphere) is not None:
-        return WrappingSphere(ball.centre, ball.radius)
-    if (roll := given.cylinder) is not None:
-        x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
-        return WrappingCylinder(roll.start, (x, y, z), roll.radius)
-    return None
+def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], place: str) -> Wraps:
+    """The obstacles of a muscle; InputError below ``place`` where there is no such bone."""
+    bones = [index(problem.bones, one.bone, join(place, f"obstacle[{i}].bone")) for i, one in enumerate(given)]
+    return Wraps(given, tuple(problem.bones[i] for i in bones))
 
 
 def _pose(turn: Rotation, centre: tuple[float, float, float]) -> Floats:

@@ -15,24 +15,20 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
+from fem_reference.geometry.quadratic import quadratic
 from fem_reference.problems.body import check_element, check_quadrature
+from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import vector_scalars
+from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.stress_statistics import stress_scalars
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept
 from fem_reference.solvers.fenicsx.processes import command_line, mpiexec, require_installed
-from fem_reference.solvers.fenicsx.session import (
-    opened,
-    session,
-    shared,
-    solve_body,
-    solve_field,
-    solve_on,
-    solve_scalar,
-)
+from fem_reference.solvers.fenicsx.session import opened, session, shared, solve_body, solve_on, solve_scalar
 from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings, Settings
 
 log = logging.getLogger(__name__)
@@ -78,12 +74,13 @@ def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOf
 
 
 def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | None) -> Outcome:
-    body, chosen = problem.body, _planned(problem, settings)
+    body, chosen, loads = problem.body, _planned(problem, settings), _are_known(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
     def pass_on(frame: Frame) -> None:  # those of the relaxation before the first requested frame are dropped
         if frame.number in problem.frames:
-            sink(_described(problem, frame, is_first=not passed))
+            described = _described(problem, frame, loads=loads, is_first=not passed)
+            sink(described if chosen.store_state else replace(described, state=None))
             passed.append(frame.number)
 
     with opened(chosen.ranks or 1) as solver:
@@ -97,8 +94,32 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
-def _described(problem: MuscleProblem, frame: Frame, *, is_first: bool) -> Frame:
-    """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle."""
+def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
+    """True where external loads act and follow from the shape alone: load and moment are quadratic in it, so that quadrature of a
+    degree below 4 gives others.
+    """
+    exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
+    still = np.zeros((len(problem.mesh.tets), 10, 3))
+    outer = any(one.outer for one in problem.effects)
+    return exact and outer and external_load(problem, problem.frames[0], still, still) is not None
+
+
+def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
+    """The components of external loads on the muscle, ``load_force_`` [N] and, about the origin, ``load_moment_`` [N mm]: from the
+    shape alone, without the solver's forms.
+    """
+    state = frame.state
+    assert state is not None  # of a muscle
+    by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
+    load = external_load(problem, frame.number, by, None if since is None else state.rate * quadratic(since))
+    assert load is not None  # as _are_known says
+    return vector_scalars("load_force", load.force) | vector_scalars("load_moment", load.moment)
+
+
+def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
+    """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle, and its
+    ``loads``, where these are known, and its stresses.
+    """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
     note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {smallest:.2g}"
@@ -108,11 +129,21 @@ def _described(problem: MuscleProblem, frame: Frame, *, is_first: bool) -> Frame
         note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
     if is_first and (overlap := scalars.get("overlap_at_rest", 0.0)) > 0:
         note += f", {overlap:.2g} mm of overlap with bones at rest removed"
-    pulls = {f"force_{name}": float(np.linalg.norm(force)) for name, force in frame.forces.items()}
+    pulls = _loads(problem, frame) if loads else {}
+    pulls |= {f"force_{name}": float(np.linalg.norm(force)) for name, force in frame.forces.items()}
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    return replace(frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame))
+    return replace(
+        frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame) | _stresses(problem, frame)
+    )
+
+
+def _stresses(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
+    """The statistics of the stress [MPa]."""
+    assert frame.state is not None  # of a muscle
+    states = {frame.number: frame.state}
+    return stress_scalars(Results(problem.mesh, problem.effects, states, problem.directions), frame.number)
 
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
@@ -136,17 +167,12 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
     surface = frame.surface
     if not problem.attached or surface is None:
         return {}
-    off = np.concatenate(
-        [
-            np.linalg.norm(
-                surface[attached.vertices]
-                - apply(attached.bone.pose(frame.number), problem.surface.points[attached.vertices]),
-                axis=1,
-            )
-            for attached in problem.attached
-        ]
-    )
-    return {"attachment_error_rms": float(np.sqrt(np.mean(off**2))), "attachment_error_max": float(off.max())}
+    off = []
+    for one in problem.attached:
+        wanted = apply(one.bone.pose(frame.number), problem.surface.points[one.vertices])
+        off.append(np.linalg.norm(surface[one.vertices] - wanted, axis=1))
+    errors = np.concatenate(off)
+    return {"attachment_error_rms": float(np.sqrt(np.mean(errors**2))), "attachment_error_max": float(errors.max())}
 
 
 def _samples(problem: MuscleProblem) -> dict[str, tuple[Ints, Floats]]:
@@ -195,3 +221,4 @@ SOLVES = (
     FieldSolver(settings=FieldSettings, solve=solve_scalar, example={}, require=require, slow=True),
     BodySolver(settings=BodySettings, solve=solve_on, example={}, require=require, slow=True),
 )
+solve_field = SOLVES[1].run  # in memory

@@ -23,12 +23,12 @@ from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, Pres
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolver
-from fem_reference.solvers.fenicsx.multigrid import Multigrid
+from fem_reference.solvers.fenicsx.linear import Factorised
+from fem_reference.solvers.fenicsx.meshes import Displacement
+from fem_reference.solvers.fenicsx.multigrid import LinearSolver, Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
-from fem_reference.solvers.fenicsx.reference_cells import Displacement
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -46,7 +46,9 @@ class AssembledBody:
         self.conserves = not any(map(_is_changed_from_outside, self.effects))
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        self.cells = meshes.own_cells(self.mesh)
+        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[
+            : self.mesh.topology.index_map(3).size_local
+        ]
         self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
@@ -244,8 +246,8 @@ class AssembledBody:
         """The number of directions in which the energy falls from the present state, which is that of ``frame``; None where the
         tangent is not symmetric. The state is kept for later frames with the same loads.
 
-        With drag or viscosity a direction counts if the energy falls along it by more than a factor e over all frames, with the
-        body attached still from now on: the viscous stress of this step is left out.
+        With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames,
+        with the bones at rest from now on: the viscous stress of this step is left out.
         """
         if self.recalled is not None:
             self.modes = self.recalled.negative_modes
@@ -283,7 +285,7 @@ class AssembledBody:
 
 
 def _is_changed_from_outside(effect: Effect) -> bool:
-    """True of an energy that changes without deformation of the body."""
+    """True for an energy that changes without deformation of the body."""
     return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
 
 

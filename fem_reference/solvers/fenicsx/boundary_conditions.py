@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Prescribed
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.reference_cells import Displacement
+from fem_reference.solvers.fenicsx.meshes import Displacement
 
 
 class PrescribedRegion:

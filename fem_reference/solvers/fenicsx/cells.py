@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, is_stabilised
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.reference_cells import lagrange
+from fem_reference.solvers.fenicsx.meshes import lagrange
 
 _CHUNK = 256  # cells
 _FIELDS = ("weights", "shape", "slopes", "values", "pressures")

@@ -64,7 +64,7 @@ class Clock:
 
     @contextmanager
     def slow(self, unknowns: Floats) -> Iterator[None]:
-        """Meanwhile a step starts from ``unknowns`` and lasts as long as all frames."""
+        """A context in which a step starts from ``unknowns`` and lasts as long as all frames."""
         if self.step is None:
             yield
             return

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.embedding import barycentric
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Cells
-from fem_reference.solvers.fenicsx.reference_cells import Displacement, geometry
+from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 
 @dataclass(frozen=True, eq=False)

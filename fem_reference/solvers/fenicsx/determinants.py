@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.problems.body import Kind, reference_nodes
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
-from fem_reference.solvers.fenicsx.reference_cells import Displacement, geometry
+from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 
 @dataclass(frozen=True)

@@ -2,36 +2,29 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator
 
 from fem_reference.foundations.errors import MissingSoftware
 
 __all__ = ["PETSc", "dolfinx"]
 
 
-@contextlib.contextmanager
-def _without(name: str) -> Iterator[bool]:
-    """Meanwhile a module that was not loaded yet is as if it were not installed; whether it was not."""
-    hidden = name not in sys.modules
-    if hidden:
-        sys.modules[name] = None  # type: ignore[assignment]
-    try:
-        yield hidden
-    finally:
-        if hidden:
-            del sys.modules[name]
-
-
-# FFCx imports numba where it is installed, for kernels that are not used here: a quarter of a process's start-up time.
-with _without("numba") as nowhere:
+# FFCx imports numba where it is installed, for kernels that are not used here: a quarter of a process's start-up time. Meanwhile it
+# is as if it were not installed, unless it is loaded already.
+_HIDDEN = "numba" not in sys.modules
+if _HIDDEN:
+    sys.modules["numba"] = None  # type: ignore[assignment]
+try:
     with contextlib.suppress(ImportError):
         import dolfinx_solver  # noqa: F401 - makes the wheel's own dolfinx importable
     import dolfinx
     from petsc4py import PETSc
 
     # Where numba is loaded, this would make libraries of the wheel global, and h5py take its HDF5 for its own.
-    if nowhere:
+    if _HIDDEN:
         import dolfinx.fem.petsc
+finally:
+    if _HIDDEN:
+        del sys.modules["numba"]
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if _VERSION < (0, 10):

@@ -16,7 +16,7 @@ from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes
-from fem_reference.solvers.fenicsx.reference_cells import DEGREE, geometry, rule
+from fem_reference.solvers.fenicsx.meshes import DEGREE, geometry, rule
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 Rule = tuple[Floats, Floats]
@@ -68,7 +68,7 @@ class Form:
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.energy = total_energy(stored, state) * self.dx
         self.kinetic = self._kinetic(effects)
-        by_place = expand_derivatives(ufl.diff(total_energy(acting, state), variables.displacement))
+        by_place = expand_derivatives(ufl.diff(total_energy(acting, state), variables[1]))
         self.kinds = 3 if isinstance(by_place, Zero) else 4
         self.silent = [_silent(effect, body.frames) for effect in body.effects]
         instants = [*body.frames, *((a + b) / 2 for a, b in pairwise(body.frames))]
@@ -86,10 +86,10 @@ class Form:
         self.derivatives = self._made[self._quiet(frame)]
 
     def _quiet(self, frame: float) -> tuple[bool, ...]:
-        """True of each effect that is left out at a frame."""
+        """True for each effect that is left out at a frame."""
         return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
 
-    def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: "_Variables") -> Derivatives:
+    def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: tuple[Any, Any, Any]) -> Derivatives:
         first, second = _differentiated(total_energy(acting, state), by, self.kinds)
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
@@ -146,16 +146,10 @@ def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
     return replace(step, predicted=fem.Function(space), velocity=fem.Function(space)) if moving else step
 
 
-@dataclass(frozen=True)
-class _Variables:
-    """The variables of differentiation of the energy at a point: ``F``, ``displacement``, and ``pressure`` where there is one."""
-
-    F: Any
-    displacement: Any
-    pressure: Any
-
-
-def _state(unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | None) -> tuple[State, _Variables]:
+def _state(
+    unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | None
+) -> tuple[State, tuple[Any, Any, Any]]:
+    """The state at a point, and its variables of differentiation: F, the displacement, and the pressure where there is one."""
     displacement, *others = (ufl.variable(part) for part in ufl.split(unknowns))
     F = ufl.variable(ufl.Identity(3) + ufl.grad(ufl.split(unknowns)[0]))
     timed: dict[str, Any] = {"F_before": _rows(F)}
@@ -172,7 +166,7 @@ def _state(unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | Non
         functions=_FUNCTIONS,
         **timed,
     )
-    return state, _Variables(F, displacement, others[0] if others else None)
+    return state, (F, displacement, state.pressure)
 
 
 def _components(unknowns: fem.Function) -> list[Any]:
@@ -196,14 +190,15 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
     ]
 
 
-def _differentiated(energy: Any, by: _Variables, kinds: int) -> tuple[list[Any], list[Any]]:
+def _differentiated(energy: Any, by: tuple[Any, Any, Any], kinds: int) -> tuple[list[Any], list[Any]]:
     """The first derivatives of ``energy`` by all variables (``kinds`` per component of the displacement, then the pressure), and
     the upper triangle of the second ones, in the order of ``cells.c``.
     """
+    F, displacement, pressure = by
     variables: list[tuple[Any, tuple[int, ...]]] = [
-        (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(kinds)
+        (F, (i, k)) if k < 3 else (displacement, (i,)) for i in range(3) for k in range(kinds)
     ]
-    variables += [(by.pressure, ())] if by.pressure is not None else []
+    variables += [(pressure, ())] if pressure is not None else []
 
     def slope(value: Any, variable: Any, where: tuple[int, ...]) -> Any:
         return ufl.diff(value, variable)[where] if where else ufl.diff(value, variable)

@@ -35,7 +35,7 @@ def kept(cut_off: CutOff, body: Body) -> Kept:
     frames = tuple(number for number in cut_off.numbers if _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)
     for path in cut_off.folder.iterdir():
-        if path not in {whole.place(number) for number in frames} and not path.name.startswith("layout_"):
+        if path not in {whole.place(number) for number in frames}:
             path.unlink()
     return Kept(whole.folder, whole.mesh, frames)
 
@@ -43,7 +43,7 @@ def kept(cut_off: CutOff, body: Body) -> Kept:
 def _is_of(whole: Kept, number: int) -> bool:
     with suppress(InputError, ValueError, KeyError, TypeError, RecursionError):
         facts = json.loads(str(read_arrays(whole.place(number))["facts"]))
-        return bool(facts["mesh"] == whole.mesh) and (whole.folder / facts["layout"]).is_file()
+        return bool(facts["mesh"] == whole.mesh)
     return False
 
 

@@ -1,7 +1,6 @@
 """Linear systems solved with a sparse factorisation (MUMPS), which serves as long as it is a good preconditioner."""
 
 from itertools import count
-from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -26,16 +25,6 @@ _number = count()
 
 class LinearSolveError(ArithmeticError):
     """The tangent is singular, or memory does not suffice to factorise it."""
-
-
-class LinearSolver(Protocol):
-    """Solves with a matrix that changes."""
-
-    def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
-
-    def solve_exactly(self) -> bool:
-        """Solve each system exactly from now on; True where that is a change."""
 
 
 def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:

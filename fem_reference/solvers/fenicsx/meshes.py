@@ -1,6 +1,10 @@
-"""A body's mesh in DOLFINx: distributed over ranks, with its regions and its unknowns."""
+"""A body's mesh in DOLFINx: distributed over ranks, with its regions, quadrature rules and unknowns, and positions and unknowns at
+reference points from tabulated basis functions, which need no compilation.
+"""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import basix.ufl
 import numpy as np
@@ -8,9 +12,98 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from fem_reference.foundations.mesh import Ints
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
-from fem_reference.solvers.fenicsx.reference_cells import lagrange
+
+# By element: the degree up to which polynomials on a straight cell are integrated exactly.
+DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
+
+# Shares of the volume and barycentric coordinates of the orbits of a rule of degree 5 that includes the vertices.
+_VERTEX_SHARE = 0.002
+_ON_MEDIANS = ((0.11990832171874463, 0.3141518976943535), (0.09393542311163477, 0.10944719170192463))
+_ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
+
+
+def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
+    """Points (q, 3) and weights (q,) on the reference cell of an element, of ``degree`` or, where it is None, of ``DEGREE``.
+
+    On quadratic tetrahedra the default rule includes the vertices. There det F of a quadratic displacement is smallest in an
+    inverting cell, and an energy that grows without bound as det F falls to zero keeps it positive where it is evaluated.
+    Standard rules leave the vertices out.
+    """
+    kind, order, _ = ELEMENTS[element]
+    if degree is None and kind == "tetrahedron" and order == 2:
+        return with_vertices()
+    points, weights = basix.make_quadrature(basix.CellType[kind], degree or DEGREE[element])
+    return np.asarray(points), np.asarray(weights)
+
+
+def with_vertices() -> tuple[Floats, Floats]:
+    """18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
+
+    Its shares and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given share of a vertex;
+    without it they are those of Walkington 2000, Quadrature on simplices of arbitrary dimension.
+    """
+    points, weights = [np.eye(4, 3, -1)], [np.full(4, _VERTEX_SHARE)]
+    for share, a in _ON_MEDIANS:
+        points.append(np.array([[a, a, a], [a, a, 1 - 3 * a], [a, 1 - 3 * a, a], [1 - 3 * a, a, a]]))
+        weights.append(np.full(4, share))
+    share, b = _ON_BIMEDIANS
+    c = 0.5 - b
+    points.append(np.array([[b, b, c], [b, c, b], [c, b, b], [c, c, b], [c, b, c], [b, c, c]]))
+    weights.append(np.full(6, share))
+    return np.concatenate(points), np.concatenate(weights) / 6
+
+
+def lagrange(kind: str, degree: int) -> Any:
+    """The Lagrange element of ``degree`` on a ``kind`` of cell, as DOLFINx makes it."""
+    return basix.create_element(basix.ElementFamily.P, basix.CellType[kind], degree, basix.LagrangeVariant.gll_warped)
+
+
+def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Floats, Floats]:
+    """The rest positions (m, q, 3) [mm] of reference ``points`` (q, 3) in ``cells`` (m,), and their slopes (m, q, 3, 3) there."""
+    values = lagrange(msh.topology.cell_name(), msh.geometry.cmap.degree).tabulate(1, points)[..., 0]
+    nodes = msh.geometry.x[msh.geometry.dofmap[cells]]
+    return np.einsum("qk,mki->mqi", values[0], nodes), np.einsum("jqk,mki->mqij", values[1:], nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Tabulated:
+    """A part of the unknowns at reference points of cells: the ``values`` (q, k) of basis functions there, their ``slopes``
+    (3, q, k) along the reference coordinates, and the ``unknowns`` (m, k, c) of the cells' nodes.
+    """
+
+    values: Floats
+    slopes: Floats
+    unknowns: Ints
+
+    def at(self, unknowns: Floats) -> Floats:
+        """The values (m, q, c) of ``unknowns`` (n,)."""
+        return np.asarray(self.values @ unknowns[self.unknowns])
+
+    def slopes_at(self, unknowns: Floats) -> Floats:
+        """Their slopes (m, q, c, 3)."""
+        return np.stack([slope @ unknowns[self.unknowns] for slope in self.slopes], axis=-1)
+
+
+def tabulate(space: fem.FunctionSpace, unknowns: Ints, points: Floats) -> Tabulated:
+    """A part of the unknowns at reference ``points`` (q, 3): its ``space``, and the ``unknowns`` (m, k, c) of the cells' nodes."""
+    element: Any = space.element.basix_element
+    values, *slopes = element.tabulate(1, points)[..., 0]
+    return Tabulated(values, np.stack(slopes), unknowns)
+
+
+class Displacement:
+    """The displacement among the ``unknowns`` of a body: its ``space`` and the unknowns ``dofs`` (n, 3) of its nodes."""
+
+    def __init__(self, unknowns: fem.Function) -> None:
+        self.unknowns = unknowns
+        self.space, parents = unknowns.function_space.sub(0).collapse()
+        self.dofs: Ints = np.reshape(np.asarray(parents, np.int64), (-1, 3))
+
+    def tabulated(self, points: Floats, count: int) -> Tabulated:
+        """At reference ``points`` (q, 3) of the first ``count`` cells."""
+        return tabulate(self.space, self.dofs[self.space.dofmap.list[:count]], points)
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
@@ -23,11 +116,6 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
     return mesh.create_mesh(
         comm, cells=np.array(cells.cells[brings][:, order]), e=element, x=np.array(cells.points[brings])
     )
-
-
-def own_cells(msh: mesh.Mesh) -> Ints:
-    """The cells (m,) of the body's mesh that are this rank's own, in the rank's order."""
-    return np.asarray(msh.topology.original_cell_index, np.int64)[: msh.topology.index_map(3).size_local]
 
 
 def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:

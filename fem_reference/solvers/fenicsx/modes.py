@@ -1,6 +1,6 @@
 """The softest mode of a body: departures along it from an unstable equilibrium, and limit points at which its stiffness is 0.
 
-At a limit point a path of equilibria turns back in time, with no state near beyond.
+At a limit point the path of equilibria ends: at a later frame there is no equilibrium nearby.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,8 @@ from petsc4py import PETSc
 
 from fem_reference.foundations.mesh import Floats, diagonal, place_of
 from fem_reference.solvers.fenicsx.body import AssembledBody
-from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, LinearSolver
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
+from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 
 _ITERATIONS = 40  # of inverse iteration
 _LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn where the state returns or no solution is found

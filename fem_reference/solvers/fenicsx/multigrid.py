@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Ints
-from fem_reference.solvers.fenicsx.linear import LinearSolveError, fgmres, iterate
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, fgmres, iterate
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
@@ -154,3 +154,6 @@ class Multigrid:
         found.sum_duplicates()
         csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
         return PETSc.Mat().createAIJ(found.shape, csr=csr, comm=self.matrix.comm)
+
+
+LinearSolver = Factorised | Multigrid

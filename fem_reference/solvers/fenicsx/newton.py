@@ -7,7 +7,8 @@ from fem_reference.runs.contents import Status
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.fenicsx.contact import ContactForces, Tractions
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
+from fem_reference.solvers.fenicsx.linear import LinearSolveError
+from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System

@@ -6,7 +6,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.solvers.fenicsx.reference_cells import Displacement, tabulate
+from fem_reference.solvers.fenicsx.meshes import Displacement, tabulate
 
 
 class Nodal:
@@ -28,21 +28,22 @@ class Nodal:
     def positions(self) -> Floats:
         """The present positions (n, 3) [mm] of the nodes of the mesh."""
         points = np.array(self.cells.points)
-        points[self.cells.cells] += self._gathered(self.moves.at(self.unknowns.array))
+        points[self.cells.cells] += self.gathered(self.moves.at(self.unknowns.array))
         return points
 
     def state(self) -> NodalState:
         """The present state of all cells."""
-        displacement = self._gathered(self.displacement.at(self.unknowns.array))
+        displacement = self.gathered(self.displacement.at(self.unknowns.array))
         pressure, before, rate = np.zeros((len(displacement), 0)), np.zeros((0, 0, 3)), 0.0
         if self.pressure is not None:
-            pressure = self._gathered(self.pressure.at(self.unknowns.array)[..., 0])
+            pressure = self.gathered(self.pressure.at(self.unknowns.array)[..., 0])
         if self.clock.step is not None:
-            before = self._gathered(self.displacement.at(self.clock.step.before.x.array))
+            before = self.gathered(self.displacement.at(self.clock.step.before.x.array))
             rate = float(self.clock.step.rate.value)
         return NodalState(displacement, pressure, before, rate)
 
-    def _gathered(self, mine: Floats) -> Floats:
+    def gathered(self, mine: Floats | Ints) -> Floats:
+        """The rows of all cells (m, ...) from those of this rank's own, on every rank."""
         gathered = np.zeros((len(self.cells.cells), *mine.shape[1:]))
         for own, part in self.comm.allgather((self.own, mine)):
             gathered[own] = part

@@ -174,7 +174,7 @@ class Process:
         self.process.wait()
 
     def end(self) -> None:
-        """End it, whatever it does."""
+        """End it at once."""
         self._stop()
         self.listener.join()
         for stream in (self.input, self.output, self.error_output):

@@ -1,16 +1,14 @@
 """The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have done.
 
-<run>/restart/layout_<hash>.npz   by rank: its cells, and the unknowns of each
-/frame_0010.npz      by rank: the unknowns and the arrays of the clock; ``facts``, in JSON
+<run>/restart/frame_0010.npz   the unknowns and the arrays of the clock, (n,) in the order of the body's cells; ``facts``, in JSON
 """
 
 import json
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, fingerprint
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.runs.states import read_arrays, write_arrays
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.jobs import Kept
@@ -25,22 +23,24 @@ class Restart:
         names = np.asarray(dofmap.list, np.int64)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
         self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, shared ones too
         self.cells = np.asarray(body.mesh.topology.original_cell_index, np.int64)[: len(names)]
-        self.layout = self._layout()
+        self.numbers = self._numbers()
         self.note = ""  # on a run that continues with other effects
 
-    def _layout(self) -> str:
-        """The name of the file with the distribution of the unknowns."""
-        own = len(self.body.cells)
-        arrays = self._gathered({"cells": self.cells[:own], "dofs": self.dofs[:own]})
-        name = f"layout_{fingerprint(*arrays.values())[:16]}.npz"
-        if self.body.comm.rank == 0 and not (self.kept.folder / name).exists():
-            write_arrays(self.kept.folder / name, arrays)
-        return name
+    def _numbers(self) -> Ints:
+        """The number of each unknown (m, u) of all cells, by its first appearance in them: the same on any ranks."""
+        dofmap = self.body.unknowns.function_space.dofmap
+        blocks, components = np.divmod(self.dofs[: len(self.body.cells)], dofmap.index_map_bs)
+        everywhere = dofmap.index_map.local_to_global(blocks.ravel().astype(np.int32)).reshape(blocks.shape)
+        names = self.body.nodal.gathered(everywhere * dofmap.index_map_bs + components)
+        _, first, which = np.unique(names, return_index=True, return_inverse=True)
+        return np.asarray(np.argsort(np.argsort(first))[which]).reshape(names.shape)
 
-    def _gathered(self, mine: dict[str, Any]) -> dict[str, Any]:
-        """Arrays of all ranks on the first rank; nothing on the others."""
-        parts = self.body.comm.gather(mine) or []
-        return {f"{rank} {name}": array for rank, part in enumerate(parts) for name, array in part.items()}
+    def _gathered(self, mine: Floats) -> Floats:
+        """The values (n,) of all unknowns from this rank's."""
+        values = self.body.nodal.gathered(mine[self.dofs[: len(self.body.cells)]])
+        found = np.zeros(self.numbers.max() + 1)
+        found[self.numbers] = values
+        return found
 
     @property
     def _acting(self) -> str:
@@ -52,8 +52,9 @@ class Restart:
     def write(self, frame: float, facts: dict[str, Any]) -> None:
         """Store the present state, that of ``frame``, with the facts of the run until then."""
         body = self.body
-        arrays = self._gathered({"unknowns": body.unknowns.x.array} | body.clock.arrays())
-        own = {"mesh": self.kept.mesh, "layout": self.layout, "recalled": body.recalled is not None}
+        arrays = {"unknowns": body.unknowns.x.array} | body.clock.arrays()
+        stored: dict[str, Any] = {name: self._gathered(values) for name, values in arrays.items()}
+        own = {"mesh": self.kept.mesh, "recalled": body.recalled is not None}
         own |= {
             "acting": self._acting,
             "clock": body.clock.facts(),
@@ -61,8 +62,8 @@ class Restart:
             "greatest_energy": body.path.greatest,
         }
         if body.comm.rank == 0:
-            arrays["facts"] = np.array(json.dumps(facts | own))
-            write_arrays(self.kept.place(frame), arrays)
+            stored["facts"] = np.array(json.dumps(facts | own))
+            write_arrays(self.kept.place(frame), stored)
 
     def good(self) -> tuple[int, ...]:
         """The frames of the states to continue from: all of them. If other effects acted in them, those up to the first that is
@@ -71,12 +72,12 @@ class Restart:
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at
         for frame in self.kept.frames:
-            arrays, facts, layout = self._read(frame)
+            arrays, facts = self._read(frame)
             if facts["acting"] == self._acting:
                 return self.kept.frames
             if body.clock.matters:
                 return ()
-            body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=True)
+            body.take_up(frame, arrays["unknowns"], recalled=True)
             if body.system.residual() > body.newton.residual:
                 break
             found.append(frame)
@@ -85,33 +86,24 @@ class Restart:
         self.note = f"; effects were added, from frame {found[-1]} on" if found else ""
         return tuple(found)
 
-    def _read(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """The arrays of a state, its facts, and its layout."""
+    def _read(self, frame: int) -> tuple[dict[str, Floats], dict[str, Any]]:
+        """This rank's arrays of a state, and its facts."""
         arrays = read_arrays(self.kept.place(frame))
-        facts = json.loads(str(arrays["facts"]))
-        return arrays, facts, read_arrays(self.kept.folder / facts["layout"])
+        facts = json.loads(str(arrays.pop("facts")))
+        mine = {name: np.zeros(len(self.body.unknowns.x.array)) for name in arrays}
+        for name, values in arrays.items():
+            mine[name][self.dofs] = values[self.numbers[self.cells]]
+        return mine, facts
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
         """Take up the state of the last of the ``frames`` and register the others; the facts stored with it."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
-            arrays, facts, layout = self._read(frame)
+            arrays, facts = self._read(frame)
             if not facts["recalled"]:
-                body.know(frame, self._spread("unknowns", arrays, layout), facts["modes"])
+                body.know(frame, arrays["unknowns"], facts["modes"])
             if frame == frames[-1]:
-                names = {name.partition(" ")[2] for name in arrays} - {"", "unknowns"}
-                body.clock.take_up({name: self._spread(name, arrays, layout) for name in names}, facts["clock"])
-                body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=facts["recalled"])
+                body.clock.take_up(arrays, facts["clock"])
+                body.take_up(frame, arrays["unknowns"], recalled=facts["recalled"])
                 body.path.greatest = facts["greatest_energy"]
         return facts
-
-    def _spread(self, name: str, arrays: Mapping[str, Any], layout: Mapping[str, Any]) -> Floats:
-        """This rank's values (n,) of an array of all ranks, by cell."""
-        ranks = [int(key.split()[0]) for key in layout if key.endswith(" cells")]
-        parts = [(layout[f"{rank} cells"], arrays[f"{rank} {name}"][layout[f"{rank} dofs"]]) for rank in ranks]
-        inside = np.zeros((sum(len(cells) for cells, _ in parts), self.dofs.shape[1]))
-        for cells, values in parts:
-            inside[cells] = values
-        mine = np.zeros(len(self.body.unknowns.x.array))
-        mine[self.dofs] = inside[self.cells]
-        return mine

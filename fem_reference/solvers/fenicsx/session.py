@@ -10,11 +10,10 @@ import cloudpickle
 import numpy as np
 
 from fem_reference.foundations.subprocesses import scratch_folder
-from fem_reference.problems.body import Body, check_quadrature
+from fem_reference.problems.body import Body
 from fem_reference.problems.checks import check
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
-from fem_reference.solvers.common.protocol import solved
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import Process, command_line, installed, require_installed
 from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
@@ -38,8 +37,7 @@ class Session:
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
         """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
-        check(body, settings.element)
-        check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
+        check(body, settings.element, settings.quadrature_degree)
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
@@ -83,8 +81,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Meanwhile all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already shared
-    process remains in use. Without FEniCSx nothing is solved and nothing shared.
+    """A context in which all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already
+    shared process remains in use. Without FEniCSx nothing is solved and nothing shared.
     """
     with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)
@@ -96,9 +94,11 @@ def shared() -> Iterator[None]:
 
 def opened(ranks: int = 1) -> AbstractContextManager[Session]:
     """The shared session, for one rank where there is one, else a new one. MissingSoftware where FEniCSx is not installed."""
-    require_installed()
     common = _shared.get() if ranks == 1 else None
-    return nullcontext(common) if common else session(ranks)
+    if common is None:
+        return session(ranks)
+    require_installed()
+    return nullcontext(common)
 
 
 def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
@@ -121,8 +121,3 @@ def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> 
     lost = Frame.of_field(problem, np.full(len(problem.fixed), np.nan), problem.form)
     sink(frames[0] if frames else lost)
     return outcome
-
-
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Run:
-    """The run of a scalar field, in memory."""
-    return solved(solve_scalar, problem, settings)

@@ -17,7 +17,7 @@ class Spent:
 
     @contextmanager
     def on(self, phase: str) -> Iterator[None]:
-        """Meanwhile time counts for ``phase``."""
+        """A context in which time counts for ``phase``."""
         self._note()
         self.within.append(phase)
         try:

@@ -21,7 +21,7 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, least
 from fem_reference.solvers.fenicsx.forms import Form, Rule
-from fem_reference.solvers.fenicsx.reference_cells import geometry
+from fem_reference.solvers.fenicsx.meshes import geometry
 
 # A cell with less of its rest volume has collapsed, whatever the laws state: about four fifths of muscle are water,
 # which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal
@@ -46,32 +46,30 @@ class Outside:
 
 
 class Ranges:
-    """The laws that were outside their ranges over the states of a run."""
+    """The laws that were outside their ranges over the states of a run: by law, the frames and what was outside."""
 
     def __init__(self) -> None:
-        self.first: dict[str, tuple[float, str]] = {}
-        self.frames: dict[str, set[float]] = {}
+        self.found: dict[str, dict[float, str]] = {}
 
     def add(self, frame: float, found: Iterable[Outside]) -> None:
         """Add the laws outside their ranges at a frame."""
         for one in found:
-            self.first.setdefault(one.law, (frame, str(one)))
-            self.frames.setdefault(one.law, set()).add(frame)
+            self.found.setdefault(one.law, {}).setdefault(frame, str(one))
 
     def facts(self) -> list[Any]:
         """The facts, in JSON's types."""
-        return [[law, frame, how, sorted(self.frames[law])] for law, (frame, how) in self.first.items()]
+        return [[law, list(states.items())] for law, states in self.found.items()]
 
     def know(self, facts: list[Any]) -> None:
         """Restore the laws that gave ``facts``."""
-        for law, frame, how, frames in facts:
-            self.first[law], self.frames[law] = (frame, how), set(frames)
+        self.found = {law: dict(states) for law, states in facts}
 
     def __str__(self) -> str:
+        firsts = [(law, len(states), *next(iter(states.items()))) for law, states in self.found.items()]
         return "".join(
-            f"; {law} is outside the range that it is meant for in {len(self.frames[law])} of the states reached, "
+            f"; {law} is outside the range that it is meant for in {count} of the states reached, "
             f"first at frame {frame:g}: {one}"
-            for law, (frame, one) in self.first.items()
+            for law, count, frame, one in firsts
         )
 
 

@@ -179,7 +179,7 @@ class Worker:
             samples.get("fibres"),
             points=body.nodal.positions(),
             scalars={name: float(value) for name, value in scalars.items()},
-            state=body.nodal.state() if self.settings.store_state else None,
+            state=body.nodal.state() if self.settings.store_state or samples else None,
             forces=forces,
             moments=moments,
             residuals=reached.last.residuals,

@@ -1,12 +1,12 @@
 """The independent second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
 
-``field`` has scalar fields; ``body`` has bodies, whose stress and stiffness are the derivatives that ``jets`` carry along.
+``field`` solves scalar fields, ``body`` bodies, whose stress and stiffness are derivatives of energies by ``jets``.
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
 from fem_reference.solvers.scikit_fem import body, field
-from fem_reference.solvers.scikit_fem.body import ScikitBodySettings, solve_body
-from fem_reference.solvers.scikit_fem.field import ScikitFieldSettings, assemble, solve_field, space
+from fem_reference.solvers.scikit_fem.body import ScikitBodySettings
+from fem_reference.solvers.scikit_fem.field import ScikitFieldSettings, assemble, space
 
 __all__ = ["SOLVES", "ScikitBodySettings", "ScikitFieldSettings", "assemble", "solve_body", "solve_field", "space"]
 
@@ -14,3 +14,5 @@ SOLVES = (
     FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
     BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )
+# Their runs in memory.
+solve_field, solve_body = SOLVES[0].run, SOLVES[1].run

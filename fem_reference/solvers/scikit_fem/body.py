@@ -12,11 +12,11 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check_quadrature
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.checks import check
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march
-from fem_reference.solvers.common.protocol import Trade, solved
+from fem_reference.solvers.common.protocol import Trade
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.scikit_fem.equations import Equations
 
@@ -47,8 +47,7 @@ class ScikitBodySettings(Record):
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     """The states of ``body`` at its frames, as far as they can be reached."""
-    check(body, settings.element)
-    check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
+    check(body, settings.element, settings.quadrature_degree)
     if body.contact is not None:
         raise InputError("contact", "bones", "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
@@ -78,11 +77,6 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
         sink(march_of.state(step))
         log.debug("frame %g: %d Newton iterations", step.frame, step.iterations)
     return Outcome("converged", f"all {len(body.frames)} frames reached", cost())
-
-
-def solve_body(body: Body, settings: ScikitBodySettings) -> Run:
-    """The run of ``body``, in memory."""
-    return solved(solve, body, settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +156,7 @@ class March:
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
-        """The equations after as much of ``step`` as leaves the forces on ``free`` unknowns below ``limit``."""
+        """The equations after ``step``, shortened until the forces on ``free`` unknowns are below ``limit``."""
         for halvings in range(_HALVINGS):
             unknowns = now.unknowns + 0.5**halvings * step
             then = _Tangent(unknowns, *self.equations.assembled(unknowns, frame))

@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-A triangle in space is laid flat, each for itself, before it is assembled: what the equations ask of a surface (lengths and areas
-within it) is not changed by that, and gradients are turned back into space.
+Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and areas
+within it); gradients are turned back into space.
 """
 
 import time
@@ -19,8 +19,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import FieldProblem, at
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
-from fem_reference.solvers.common.protocol import solved
+from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above leave no correct digit
@@ -33,14 +32,14 @@ _ELEMENTS = {
 
 
 class ScikitFieldSettings(Record):
-    """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
+    """``form``: that of the ``scene``, or always plain ``galerkin``, to show the effect of stabilisation."""
 
     form: Literal["scene", "galerkin"] = "scene"
 
 
 @dataclass(frozen=True, eq=False)
 class Flat:
-    """A mesh as scikit-fem sees it: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
+    """A mesh in the form of scikit-fem: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
     coordinates (t,) to the coordinates of the domain (d,).
     """
 
@@ -70,7 +69,7 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right side (N,) of the weak form, without what is fixed; nodes in the order of the problem."""
+    """Matrix (N, N) and right side (N,) of the weak form, without fixed values; nodes in the order of the problem."""
     basis, laid = space(problem)
     place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
 
@@ -103,11 +102,6 @@ def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> O
     values, outcome = _solved(problem)
     sink(Frame.of_field(problem, values, problem.form))
     return outcome
-
-
-def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Run:
-    """The run of a scalar field, in memory."""
-    return solved(solve, problem, settings)
 
 
 def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:

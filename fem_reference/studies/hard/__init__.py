@@ -1,1 +1,1 @@
-"""Hard cases: which there are, the problems they pose, and every solver on each of them."""
+"""Hard cases: their files, the problems that they pose, and every solver on each of them."""

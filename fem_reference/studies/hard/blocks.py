@@ -12,15 +12,13 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, Tet
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.block import kuhn, lattice_skin
-from fem_reference.geometry.exemption import free_skin
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.skins import spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
-from fem_reference.problems.muscle import MuscleProblem, solid, spring_skins
+from fem_reference.problems.muscle import MuscleProblem, assembled, closed_form
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.scenes.muscle import CaseBone
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.
@@ -43,7 +41,8 @@ def problem(hard: Hard) -> MuscleProblem:
     surface = Surface(points[index], triangles, f"the block of {hard.name}")
     ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
     _check_held(hard, ends, surface)
-    bones = tuple(end.bone for end in ends) + tuple(_bone(hard, i, surface) for i in range(len(hard.bone)))
+    others = (closed_form(bone, surface, join(hard.place, f"bone[{i}]")) for i, bone in enumerate(hard.bone))
+    bones = (*(end.bone for end in ends), *others)
     size = np.asarray(block.size)
     middle, cell = np.asarray(block.corner) + size / 2, float((size / block.cells).min())
     start = Moved(hard.start, middle, cell) if hard.start else None
@@ -82,27 +81,11 @@ class Moved:
 
 
 def _filled(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> MuscleProblem:
-    pressed = among(acting) is not None
-    if pressed:
+    if among(acting) is not None:
         check_exempt(setup.exempt, "hold")
-    apart = block.points_apart or spacing(setup.surface)
     x, y, z = (np.asarray(block.fibre) / np.linalg.norm(block.fibre)).tolist()
-    return MuscleProblem(
-        setup.surface,
-        setup.bones,
-        setup.attached,
-        setup.frames,
-        setup.interval,
-        mesh=mesh,
-        effects=acting,
-        fibres=_lines(block),
-        mesh_facts={},
-        seconds=0.0,
-        fibre=Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None,
-        start=setup.start,
-        skin=free_skin(setup.exempt, mesh, apart) if pressed else None,
-        attached_skins=spring_skins(setup, mesh, apart),
-    )
+    fibre = Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None
+    return assembled(setup, mesh, acting, (_lines(block), fibre), block.points_apart or spacing(setup.surface))
 
 
 def _placed(block: Lattice, nodes: Ints) -> Floats:
@@ -152,14 +135,6 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
         if not np.max(off, initial=0.0) <= _SAME * max(hard.block.size if hard.block else (1.0,)):
             got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves otherwise"
             raise InputError(join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or one motion")
-
-
-def _bone(hard: Hard, i: int, surface: Surface) -> Bone:
-    bone: CaseBone = hard.bone[i]
-    form = solid(bone)
-    assert form is not None  # a Hard record has no others
-    motion = bone.motion.poses() if bone.motion else None
-    return Bone(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
 
 
 def _lines(block: Lattice) -> Polylines:

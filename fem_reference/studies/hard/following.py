@@ -35,17 +35,17 @@ Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """The machine was too busy to say anything of a run, and why."""
+    """The machine was too busy for a conclusion about a run; the reason."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
-    """StalledError where an ``outcome`` says nothing of the run."""
+    """Raise StalledError where an ``outcome`` allows no conclusion about the run."""
     if outcome.status == "stalled":
         raise StalledError(outcome.message)
 
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    """Solve a problem by a solver; InputError where that is not for it, StalledError where the machine was too busy."""
+    """Solve a problem by a solver; InputError where it does not suit the solver, StalledError where the machine was too busy."""
     solver, task, muscle = choice.solver, task_of(choice.solver, built.task), built.muscle
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
@@ -57,7 +57,7 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         raise InputError(solver, f"{len(muscle.mesh.tets)} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
     solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
-    solvers.require(solver, settings, solver, task)
+    solvers.find(solver, solver, task).require(settings)
     frames = list[Frame]()
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)
     check_not_stalled(outcome)

@@ -1,4 +1,4 @@
-"""Every solver on every hard case: runs, and what became of them."""
+"""Every solver on every hard case: runs and their results."""
 
 import logging
 import re

@@ -1,7 +1,10 @@
 """The loop over frame numbers: which frames are wanted, what it costs, and how it ends."""
 
+from dataclasses import replace
+
 import pytest
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome
@@ -47,6 +50,14 @@ def test_wanted_frames_are_given_on_and_every_iteration_counts(loop, given, visi
     cost = outcome.cost
     assert (cost["iterations"], cost["threads"], cost["seconds_setup"]) == (len(visited), 1, 0.25)
     assert cost["seconds_per_iteration"] == cost["seconds_solve"] / len(visited)
+
+
+def test_more_frame_numbers_than_anybody_goes_through_are_refused() -> None:
+    far = replace(SETUP, frames=(2, 10**9))
+    with pytest.raises(
+        InputError, match=r"frames\.last: got 1000000000, .*want at most 100000 frame numbers after the first"
+    ):
+        follow(Counting(), far, list[Frame]().append)
 
 
 def test_it_ends_where_the_state_is_lost_and_keeps_what_it_reached() -> None:

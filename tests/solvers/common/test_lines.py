@@ -10,13 +10,14 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines
+from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Joint
 from fem_reference.runs.store import Frame
 from fem_reference.solvers import line_of_action
+from fem_reference.solvers.common.lines import nearest_bones
 
 pytestmark = pytest.mark.slow  # tetrahedra of a bar
 
@@ -149,3 +150,16 @@ def test_points_that_are_refused(changed, message) -> None:
 def test_without_a_joint_in_the_case_a_guided_point_is_refused() -> None:
     with pytest.raises(InputError, match="want a joint of the case, which has none"):
         solved(replace(hinged(), joints=()), ON_TOP | {"within": ["0 rad", "1 rad"]})
+
+
+def test_the_nearest_bone_has_the_nearest_vertex() -> None:
+    """Not the nearest on average: from the end of a long row of vertices most of it is far."""
+    row = np.column_stack([np.arange(0.0, 101, 10), np.zeros(11), np.zeros(11)])
+    surface = Surface(np.vstack([row, [[95.0, 0, 20]]]), np.array([[0, 1, 2]]))
+    given = hinged()
+    attached = [
+        replace(one, vertices=vertices)
+        for one, vertices in zip(given.attached, (np.arange(11), np.array([11])), strict=True)
+    ]
+    given = replace(given, surface=surface, attached=tuple(attached))
+    assert nearest_bones(given, np.array([[95.0, 0, 1], [95, 0, 19]]), "lines").tolist() == [0, 1]

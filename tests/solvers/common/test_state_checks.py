@@ -5,7 +5,7 @@ import pytest
 import shapes
 
 from fem_reference.foundations.motion import RigidMotion, apply
-from fem_reference.solvers.common.state_checks import Finite, Trouble, first_trouble, surface_checks
+from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble, first_trouble
 
 REST = shapes.sphere(1, 10.0)
 NONE = np.zeros(0, np.int64)
@@ -13,7 +13,7 @@ TURN = RigidMotion((1, 2, 3), (5, -4, 700), (0.0, 1.0), (0.0, 2.0)).pose(1)
 
 
 def trouble(points, rest, attached) -> Trouble | None:
-    return first_trouble(surface_checks(rest, attached), points)
+    return SurfaceCheck(rest, attached).trouble(points)
 
 
 class Unasked:
@@ -24,9 +24,9 @@ class Unasked:
 
 
 def test_checks_are_asked_in_their_order_up_to_the_first_that_finds_trouble():
-    lost = np.full((2, 3), np.nan)
-    assert first_trouble((Finite(), Unasked()), lost).status == "diverged"
-    assert first_trouble((Finite(), Finite()), np.zeros((2, 3))) is None
+    check = SurfaceCheck(REST, NONE)
+    assert first_trouble((check, check, Unasked()), np.nan * REST.points) == check.trouble(np.nan * REST.points)
+    assert first_trouble((check, check), REST.points) is None
 
 
 def scaled(*factors):

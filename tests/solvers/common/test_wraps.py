@@ -6,7 +6,7 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
@@ -26,7 +26,7 @@ def given() -> MuscleProblem:
 
 def wraps(given: MuscleProblem, *obstacles: dict) -> Wraps:
     made = tuple(parse(ObstacleOn, one, "obstacle") for one in obstacles)
-    return wraps_of(given, made, [f"obstacle[{i}]" for i in range(len(made))])
+    return wraps_of(given, made, "")
 
 
 FIXED = np.array([[[5.0, 4, 0], [6, 4, 30]], [[4.0, 6, 1], [5, 5.5, 29]], [[14.0, 6, 1], [15, 6, 29]]])
@@ -58,11 +58,20 @@ def test_what_is_deepest_inside_is_named(given) -> None:
     fixed = FIXED.copy()
     fixed[1, 1] = [11, 5, 16.5]
     name, message = wraps(given, BALL, RING).inside(fixed, 0)
-    assert name == "torus"
+    assert name == "obstacle[1]"
     assert message.startswith("a fixed point of line 1 ")
     assert wraps(given, BALL, RING).inside(FIXED, 0) == ("", "")
     fixed[1, 1] = [5, 5, 18]
-    assert wraps(given, BALL, RING).inside(fixed, 0) == ("sphere", "a fixed point of line 1 1 mm inside")
+    assert wraps(given, BALL, RING).inside(fixed, 0) == ("obstacle[0]", "a fixed point of line 1 1 mm inside")
+
+
+def test_what_an_obstacle_is_moved_to_is_inside(given) -> None:
+    """A ball of 4 mm, 20 mm off the axis that its bone turns about: inside it is what its centre has come to, not where it was."""
+    centre = apply(SWING.pose(10), np.array([[5.0, 5, 15]]))[0]
+    fixed = np.array([[[5.0, 4, 0], centre]])
+    assert wraps(given, BALL).inside(fixed, 10) == ("sphere", "a fixed point of line 0 4 mm inside")
+    assert wraps(given, BALL).inside(fixed, 0) == ("", "")
+    assert wraps(given, BALL).inside(np.array([[[5.0, 4, 0], [5, 5, 15]]]), 10) == ("", "")
 
 
 @pytest.mark.parametrize(

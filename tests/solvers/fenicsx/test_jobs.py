@@ -1,9 +1,8 @@
-"""States to go on from: those of this mesh whose layout is there; anything else in the folder is removed."""
+"""States to go on from: those of this mesh; anything else in the folder is removed."""
 
 import json
 
 import numpy as np
-import pytest
 
 from fem_reference.foundations.mesh import fingerprint
 from fem_reference.problems import shapes
@@ -18,12 +17,11 @@ BODY = Body(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), parts.neo_hoo
 
 def left(folder, number: int, **facts: object) -> None:
     """What an earlier process left of a frame."""
-    known = {"mesh": fingerprint(BODY.mesh.points, BODY.mesh.cells), "layout": "layout_one.npz"} | facts
+    known = {"mesh": fingerprint(BODY.mesh.points, BODY.mesh.cells)} | facts
     write_arrays(folder / f"frame_{number:04d}.npz", {"facts": np.array(json.dumps(known))})
 
 
 def test_states_of_this_mesh_are_gone_on_from(tmp_path) -> None:
-    write_arrays(tmp_path / "layout_one.npz", {"0 cells": np.arange(6)})
     for number in (0, 5):
         left(tmp_path, number)
     (tmp_path / "strange.txt").write_text("of nobody", encoding="utf-8")
@@ -33,10 +31,8 @@ def test_states_of_this_mesh_are_gone_on_from(tmp_path) -> None:
     assert not (tmp_path / "strange.txt").exists()
 
 
-@pytest.mark.parametrize("facts", [{"mesh": "another"}, {"layout": "layout_that_is_gone.npz"}])
-def test_states_of_something_else_are_removed(tmp_path, facts) -> None:
-    write_arrays(tmp_path / "layout_one.npz", {"0 cells": np.arange(6)})
+def test_states_of_something_else_are_removed(tmp_path) -> None:
     left(tmp_path, 0)
-    left(tmp_path, 5, **facts)
+    left(tmp_path, 5, mesh="another")
     assert kept(CutOff(tmp_path, (0, 5)), BODY).frames == (0,)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["frame_0000.npz", "layout_one.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["frame_0000.npz"]

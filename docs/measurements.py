@@ -1,0 +1,198 @@
+"""Tables of the documentation: what is kept of each measurement, and the rows that a page shows of it."""
+
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fem_reference.assessment import cost_study, fronts
+from fem_reference.assessment.stress import VERDICTS
+from fem_reference.foundations.records import parse
+
+KEPT = Path(__file__).parent / "measured"
+_SURFACE, _TIME = "surface_deviation.rms", "seconds_processor"
+# Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
+_ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
+_END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
+_STEPS = ("1", "10", "40")
+
+
+class Measurement(NamedTuple):
+    """A ``command``; ``keep`` picks from its JSON what tables need."""
+
+    command: str
+    keep: Callable[[Any], Any]
+
+
+def kept(name: str) -> dict[str, Any]:
+    """A kept measurement."""
+    return json.loads((KEPT / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def table(name: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown, and below it where its numbers come from."""
+    lines = [list(head), ["---"] * len(list(head)), *([str(cell) for cell in row] for row in rows)]
+    file = kept(name)
+    origin = f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin}</small>\n"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number as people read it."""
+    return "not known" if value is None else f"{value:.{digits}g}"
+
+
+def _verify(found: dict[str, Any]) -> Any:
+    keys = ("group", "name", "kind", "verdict", "value", "truth", "error", "within", "unit")
+    return [{key: one[key] for key in keys} for one in found["entries"]]
+
+
+def _verify_groups() -> str:
+    groups = dict[str, list[dict[str, Any]]]()
+    for one in kept("verify")["measured"]:
+        groups.setdefault(one["group"], []).append(one)
+    rows = [
+        (name, len(ones), ", ".join(sorted({one["kind"] for one in ones})), number(max(map(_share, ones)), 2))
+        for name, ones in groups.items()
+    ]
+    return table("verify", ("group", "entries", "truth", "greatest share of a tolerance"), rows)
+
+
+def _share(entry: dict[str, Any]) -> float:
+    return entry["error"] / entry["within"] if entry["within"] else 0.0
+
+
+def _comparison(found: dict[str, Any]) -> Any:
+    costs = ("seconds_processor", "unknowns", "newton_iterations", "load_steps")
+    cost = {name: {key: one[key] for key in costs if key in one} for name, one in found["cost"].items()}
+    worst = dict[tuple[str, ...], dict[str, Any]]()
+    for one in found["measures"]:
+        key = one["candidate"], one["metric"], one["statistic"]
+        if one["value"] is not None and abs(one["value"]) > abs(worst.get(key, {"value": -0.0})["value"]):
+            worst[key] = one
+    shown = {("volume", "deviation"), ("fibre_length", "max"), ("surface_deviation", "rms"), ("penetration", "deepest")}
+    measures = [one for (_, *what), one in worst.items() if tuple(what) in shown]
+    return {"cost": cost, "worst": measures}
+
+
+def _comparison_worst() -> str:
+    measured = kept("hip_flexion")["measured"]
+    columns = {
+        ("surface_deviation", "rms"): "surface, rms",
+        ("fibre_length", "max"): "worst fibre",
+        ("volume", "deviation"): "volume",
+        ("penetration", "deepest"): "deepest in a bone",
+    }
+    rows = []
+    for name, cost in measured["cost"].items():
+        found = {(one["metric"], one["statistic"]): one for one in measured["worst"] if one["candidate"] == name}
+        if name != "reference":
+            cells = (f"{number(found[key]['value'])} {found[key]['unit']}" if key in found else "" for key in columns)
+            rows.append((f"`{name}`", *cells, f"{number(cost['seconds_processor'], 2)} s"))
+    return table("hip_flexion", ("candidate", *columns.values(), "processor time"), rows)
+
+
+def _reference() -> str:
+    cost = kept("hip_flexion")["measured"]["cost"]["reference"]
+    row = [f"{cost[key]:.0f}" for key in ("unknowns", "load_steps", "newton_iterations", "seconds_processor")]
+    return table("hip_flexion", ("unknowns", "load steps", "Newton iterations", "processor time, s"), [row])
+
+
+def _omissions(found: dict[str, Any]) -> Any:
+    statistics = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
+    rows = []
+    for solver in found["ablations"]:
+        costs = solver["whole"]["costs"]
+        clock = "seconds_processor_solve" if solver["name"] == "reference" else "seconds_processor"
+        for one in solver["omissions"]:
+            share = one["costs"][clock] / costs[clock] if one["status"] == "converged" else None
+            changes = [one["changes"].get(name) for name in statistics]
+            rows.append({"of": solver["name"], "left_out": one["left_out"], "status": one["status"]})
+            rows[-1] |= {"changes": changes, "time": share, "verdict": one.get("verdict", "")}
+    return rows
+
+
+def _omission_rows() -> str:
+    rows = []
+    for one in kept("effects")["measured"]:
+        of = "" if one["of"] == "reference" else f"`{one['of']}`: "
+        name = of + ", ".join(f"`{effect}`" for effect in one["left_out"])
+        changes = [
+            "" if value is None else f"{number(value, 2)} {unit}"
+            for value, unit in zip(one["changes"], ("mm", "%", "%"), strict=True)
+        ]
+        time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
+        rows.append((name, *changes, time, one["verdict"] or one["status"]))
+    return table("effects", ("left out", "surface, rms", "fibre length, rms", "volume", "time", ""), rows)
+
+
+def _study(found: dict[str, Any]) -> Any:
+    study = parse(cost_study.CaseStudy, found["cases"][0], "study")
+    own = [one for one in study.points if one.name == "reference" and not one.is_truth and one.status == "converged"]
+    keys = ("unknowns", _TIME)
+    reference = [{"setting": one.label} | {key: one.costs[key] for key in keys} | _errors(one) for one in own]
+    return {"bar": study.bars[_SURFACE], "reference": reference}
+
+
+def _errors(point: fronts.Point) -> dict[str, float]:
+    return {name: point.errors[name] for name in (_SURFACE, "fibre_length.rms_percent")}
+
+
+def _study_reference() -> str:
+    rows = []
+    for one in kept("study")["measured"]["reference"]:
+        surface, fibres = number(one[_SURFACE], 2), number(one["fibre_length.rms_percent"], 2)
+        rows.append((one["setting"], f"{one['unknowns']:.0f}", f"{surface} mm", f"{fibres} %", number(one[_TIME], 2)))
+    return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
+
+
+def _stress(found: dict[str, Any]) -> Any:
+    counts = [
+        {"solver": name} | Counter(one["verdict"] for one in found["cells"] if one["solver"] == name)
+        for name in found["solvers"]
+    ]
+    ends = []
+    for one in found["cells"]:
+        if one["solver"] == "fenicsx" and (said := _ENDS.search(one["sentence"])):
+            off = {count: float(share) if share else status for count, share, _, status in _END.findall(said[2])}
+            finest = {of for _, _, of, _ in _END.findall(said[2]) if of}
+            ends.append({"case": one["case"], "verdict": one["verdict"], "frame": int(said[1])})
+            ends[-1] |= {"off": off | dict.fromkeys(finest, "finest")}
+    return {"counts": counts, "ends": ends}
+
+
+def _stress_solvers() -> str:
+    rows = [
+        (f"`{one['solver']}`", *(one.get(verdict, 0) for verdict in VERDICTS))
+        for one in kept("stress")["measured"]["counts"]
+    ]
+    return table("stress", ("solver", *VERDICTS), rows)
+
+
+def _stress_steps() -> str:
+    rows = []
+    for one in kept("stress")["measured"]["ends"]:
+        off = (one["off"].get(count, "") for count in _STEPS)
+        cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
+        rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
+    return table("stress", ("case", "verdict", "to frame", *(f"in {count}" for count in _STEPS)), rows)
+
+
+MEASUREMENTS = {
+    "verify": Measurement("./fem verify", _verify),
+    "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
+    "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
+    "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
+    "stress": Measurement("./fem stress --steps", _stress),
+}
+TABLES = {
+    "verify_groups": _verify_groups,
+    "hip_flexion_worst": _comparison_worst,
+    "hip_flexion_reference": _reference,
+    "effects_hip_flexion": _omission_rows,
+    "study_reference": _study_reference,
+    "stress_solvers": _stress_solvers,
+    "stress_steps": _stress_steps,
+}

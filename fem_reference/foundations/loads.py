@@ -1,0 +1,44 @@
+"""External loads on a body: their force and moment, and what they depend on of its shape."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem_reference.foundations.mesh import Floats
+
+
+class Wrench(NamedTuple):
+    """A ``force`` (3,) [N] and its ``moment`` (3,) [N mm] about the origin."""
+
+    force: Floats
+    moment: Floats
+
+
+class Shape(Protocol):
+    """The present shape of a body, and its velocity."""
+
+    def measure(self, on: str | None = None) -> tuple[float, Floats]:
+        """The volume [mm3] at rest, or the area [mm2] of a region ``on``, and the integral (3,) of the present positions over it;
+        NaN where these are unknown.
+        """
+
+    def facing(self, on: str) -> tuple[Floats, Floats] | None:
+        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None where unknown."""
+
+    def motion(self) -> tuple[Floats, Floats] | None:
+        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None
+        where unknown.
+        """
+
+
+def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:
+    """The wrench of a force of ``density`` (3,) per volume or area at rest, which moves with the body and keeps its direction."""
+    (measure, first), each = shape.measure(on), np.asarray(density, float)
+    return Wrench(each * measure, np.cross(first, each))
+
+
+def total(wrenches: list[Wrench]) -> Wrench:
+    """The sum of wrenches."""
+    force, moment = np.sum([np.zeros((2, 3)), *map(np.stack, wrenches)], axis=0)
+    return Wrench(force, moment)

@@ -1,0 +1,105 @@
+"""Tetrahedra with quadratic displacements: exact integrals of positions and of vector areas."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, TetMesh, corner_areas, tet_volumes
+
+# The corners of a tet between which its last six nodes are.
+EDGES = np.array([[0, 1], [0, 2], [1, 2], [0, 3], [1, 3], [2, 3]])
+_MIDDLE = np.zeros((4, 4), np.int64)
+_MIDDLE[EDGES[:, 0], EDGES[:, 1]] = _MIDDLE[EDGES[:, 1], EDGES[:, 0]] = np.arange(4, 10)
+# The ten nodes' shares of the integral of a quadratic function over a straight tet, and the six nodes' over a straight triangle.
+_BULK = np.repeat([-1 / 20, 1 / 5], [4, 6])
+_FLAT = np.repeat([0, 1 / 3], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Displaced:
+    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s]:
+    corners of each tet, then the middles of its ``EDGES``; None where these are unknown. A
+    :class:`fem_reference.foundations.loads.Shape`.
+    """
+
+    mesh: TetMesh
+    by: Floats | None = None
+    velocity: Floats | None = None
+
+    @cached_property
+    def nodes(self) -> Floats:
+        """The present positions (k, 10, 3) [mm] of the nodes; NaN where they are unknown."""
+        corners = self.mesh.points[self.mesh.tets]
+        middles = corners[:, EDGES].mean(axis=2)
+        return np.asarray(np.concatenate([corners, middles], axis=1) + (np.nan if self.by is None else self.by))
+
+    def measure(self, on: str | None = None) -> tuple[float, Floats]:
+        """The volume [mm3] at rest, or the area [mm2] of a region, and the integral (3,) of the present positions over it."""
+        if on is None:
+            sizes, means = tet_volumes(self.mesh.points, self.mesh.tets), np.einsum("q,kqi->ki", _BULK, self.nodes)
+        else:
+            tets, local = self._facets(on)
+            sizes = corner_areas(self.mesh.points[np.take_along_axis(self.mesh.tets[tets], local[:, :3], axis=1)])
+            means = np.einsum("q,mqi->mi", _FLAT, self.nodes[tets[:, None], local])
+        return float(sizes.sum()), np.asarray(sizes @ means)
+
+    def facing(self, on: str) -> tuple[Floats, Floats] | None:
+        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None where unknown."""
+        if self.by is None:
+            return None
+        tets, local = self._facets(on)
+        values, slopes, weights = _triangle()
+        nodes = self.nodes[tets[:, None], local]
+        places, (one, other) = values @ nodes, (slope @ nodes for slope in slopes)
+        areas = weights[:, None] * np.cross(one, other)
+        return areas.sum(axis=(0, 1)), np.cross(places, areas).sum(axis=(0, 1))
+
+    def motion(self) -> tuple[Floats, Floats] | None:
+        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None
+        where unknown.
+        """
+        if self.by is None or self.velocity is None:
+            return None
+        sizes = tet_volumes(self.mesh.points, self.mesh.tets)
+        moments = np.cross(_products() @ self.nodes, self.velocity).sum(axis=1)
+        return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
+
+    def _facets(self, on: str) -> tuple[Ints, Ints]:
+        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in it: corners, outward, and middles."""
+        size = len(self.mesh.points)
+        found, wanted = (
+            (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]
+            for ends in (np.sort(self.mesh.tets[:, TET_FACES].reshape(-1, 3)), np.sort(self.mesh.facets[on]))
+        )
+        tets, sides = np.divmod(np.flatnonzero(np.isin(found, wanted)), 4)
+        corners = TET_FACES[sides]
+        return tets, np.hstack([corners, _MIDDLE[corners, np.roll(corners, -1, axis=1)]])
+
+
+def _triangle() -> tuple[Floats, tuple[Floats, Floats], Floats]:
+    """The six basis functions (q, 6) at quadrature points of a triangle, their two slopes, and weights (q,): exact to degree 4."""
+    ticks, shares = np.polynomial.legendre.leggauss(3)
+    u, v = (axis.ravel() for axis in np.meshgrid((1 + ticks) / 2, (1 + ticks) / 2, indexing="ij"))
+    b, c = u, v * (1 - u)
+    a, zero, one = 1 - b - c, np.zeros_like(b), np.ones_like(b)
+    values = np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=1)
+    along = np.stack([1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c], axis=1)
+    across = np.stack([1 - 4 * a, zero, 4 * c - 1, -4 * b, 4 * b, 4 * (a - c)], axis=1)
+    return values, (along, across), np.outer(shares, shares).ravel() / 4 * (one - u)
+
+
+def _products() -> Floats:
+    """The means (10, 10) over a tet of the products of its basis functions, by quadrature that is exact to degree 4."""
+    ticks, shares = np.polynomial.legendre.leggauss(4)
+    u, v, w = (axis.ravel() for axis in np.meshgrid(*[(1 + ticks) / 2] * 3, indexing="ij"))
+    a, b, c = u, v * (1 - u), w * (1 - u) * (1 - v)
+    corners = np.stack([1 - a - b - c, a, b, c], axis=1)
+    values = np.hstack([corners * (2 * corners - 1), 4 * corners[:, EDGES[:, 0]] * corners[:, EDGES[:, 1]]])
+    weights = np.einsum("i,j,k->ijk", shares, shares, shares).ravel() / 8 * (1 - u) ** 2 * (1 - v) * 6
+    return np.asarray((weights * values.T) @ values)
+
+
+def quadratic(nodal: Floats) -> Floats:
+    """Values (k, 10, c) at the ten nodes of tets, from ``nodal`` ones (k, 10, c) or, where these are linear, (k, 4, c)."""
+    return nodal if nodal.shape[1] == 10 else np.concatenate([nodal, nodal[:, EDGES].mean(axis=2)], axis=1)

@@ -1,0 +1,54 @@
+"""MSH of gmsh, by meshio."""
+
+import io
+import re
+from contextlib import redirect_stderr
+from pathlib import Path
+
+from fem_reference.io.formats import Format
+from fem_reference.io.soup import Soup, of_meshio
+
+# What follows the name of a section that declares how many nodes or elements it has: as text, or as up to four numbers in binary.
+_DECLARED = re.compile(rb"\$(Nodes|Elements)\r?\n([\d \t]+(?=[\r\n])|.{32}|.{4})", re.DOTALL)
+# meshio looks beyond the end of a file once, to see that it is there.
+_PAST_END = 2
+
+
+class _Ending(io.BufferedReader):
+    """A file that refuses to be read on and on beyond its end: meshio counts as far as a file says, whatever is in it."""
+
+    past = 0
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """The next line; ValueError where there has been none for a while."""
+        line = super().readline(size)
+        self.past += not line
+        if self.past > _PAST_END:
+            raise ValueError("a section that goes on beyond the end of the file")
+        return line
+
+
+def _read(path: Path) -> Soup:
+    """The triangles of a mesh; points and line cells are passed over."""
+    from meshio.gmsh.main import read_buffer
+
+    _check_declared(path.read_bytes())
+    with redirect_stderr(io.StringIO()), _Ending(io.FileIO(path)) as file:  # meshio prints what it skips
+        mesh = read_buffer(file)
+    return of_meshio(mesh.points, mesh.cells)
+
+
+def _check_declared(data: bytes) -> None:
+    """ValueError where a section declares more nodes or elements, or blocks of them, than a file has bytes."""
+    header = data[:60].split()
+    binary, old = header[2:3] == [b"1"], header[1:2] == [b"2.2"]
+    for name, first in _DECLARED.findall(data):
+        if binary and not old:
+            numbers = [int.from_bytes(first[i : i + 8], "little") for i in (0, 8)]
+        else:  # of old files that number is a text whatever the rest is
+            numbers = [int(word[:20]) for word in first.split()[: 1 if old else 2] if word.isdigit()]
+        if max(numbers, default=0) > len(data):
+            raise ValueError(f"{name.decode()} that are more than the file has bytes")
+
+
+FORMAT = Format((".msh",), _read)

@@ -1,0 +1,15 @@
+"""The verb ``page``: what it says where nothing can be measured."""
+
+import pytest
+
+from fem_reference import cli
+
+
+def test_a_page_of_cases_without_their_files_is_refused_with_the_reason(
+    tmp_path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("FEM_REFERENCE_DATA", raising=False)
+    assert cli.main(["page", "estimation", "--case", "gluteus_maximus", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "estimation: got no case that can be measured (gluteus_maximus: " in said
+    assert "FEM_REFERENCE_DATA" in said
