@@ -146,11 +146,14 @@ def read_tables(folder: Path) -> None:
 
 
 def _meshes() -> dict[str, Kind]:
-    made: dict[str, Callable[[Path], None]] = {suffix: _make_surface(suffix) for suffix in files.surface_suffixes()}
+    made: dict[str, Callable[[Path], None]] = {
+        suffix: _make_surface(suffix) for suffix in files.surface_suffixes() if suffix != ".msh"
+    }
     made |= {"binary.ply": _make_surface(".ply", binary=True), "binary.stl": _make_surface(".stl", binary=True)}
     made |= {"meshio.vtu": _make_surface(".vtu", binary=True), "text.vtu": _make_surface(".vtu", binary=False)}
     made |= {
         "text.vtk": _make_surface(".vtk", binary=False),
+        ".msh": _make_surface(".msh", file_format="gmsh"),
         "old.msh": _make_surface(".msh", file_format="gmsh22", binary=False),
     }
     found = {f"surface {name}": Kind(make, "ball*", read_surface) for name, make in made.items()}

@@ -63,7 +63,8 @@ def sphere(subdivisions: int, radius: float = 1.0) -> Surface:
 
 def write(path: Path, surface: Surface, points: Floats) -> None:
     """A file of a ``surface`` with its points at ``points``, by meshio: as other programs write it."""
-    meshio.Mesh(points, [("triangle", surface.triangles)]).write(path)
+    form = "gmsh" if path.suffix == ".msh" else None  # or else it would be another program's
+    meshio.Mesh(points, [("triangle", surface.triangles)]).write(path, form)
 
 
 def _subdivide(points: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarray]:

@@ -1,5 +1,6 @@
 """Forces of runs on bones, as a table and as points with vectors, and the moment arms about joints."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,9 +28,13 @@ _NOWHERE = np.zeros(3)
 
 
 def write_table(comparison: Comparison, path: Path) -> None:
-    """Write a row for each run, frame and bone that has a force or a joint; unknown values are left empty."""
+    """Write a row for each run, frame and bone that has a force or a joint; unknown and infinite values are left empty."""
     found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
-    write_csv(path, COLUMNS, (["" if value != value else value for value in row] for row in found))
+    write_csv(
+        path,
+        COLUMNS,
+        (["" if isinstance(value, float) and not math.isfinite(value) else value for value in row] for row in found),
+    )
 
 
 def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object, ...]]:

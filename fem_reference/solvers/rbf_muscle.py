@@ -164,6 +164,7 @@ class RbfMuscle(MovingSurface):
             bony = points.copy()
             carry(bony, self.setup, number)
             points += self.beside[:, None] * (bony - points)[self.nearest]
+            carry(points, self.setup, number)  # exactly, however far the surface of the Gaussians was
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
         if self.settings.volume:
             points += self._missing_volume(points)

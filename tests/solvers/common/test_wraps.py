@@ -69,7 +69,7 @@ def test_what_an_obstacle_is_moved_to_is_inside(given) -> None:
     """A ball of 4 mm, 20 mm off the axis that its bone turns about: inside it is what its centre has come to, not where it was."""
     centre = apply(SWING.pose(10), np.array([[5.0, 5, 15]]))[0]
     fixed = np.array([[[5.0, 4, 0], centre]])
-    assert wraps(given, BALL).inside(fixed, 10) == ("sphere", "a fixed point of line 0 4 mm inside")
+    assert wraps(given, BALL).inside(fixed, 10) == ("obstacle[0]", "a fixed point of line 0 4 mm inside")
     assert wraps(given, BALL).inside(fixed, 0) == ("", "")
     assert wraps(given, BALL).inside(np.array([[[5.0, 4, 0], [5, 5, 15]]]), 10) == ("", "")
 
