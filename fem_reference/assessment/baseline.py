@@ -46,9 +46,7 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic: ``values`` per frame, the ``tolerance`` of a change of each, and the greatest magnitude allowed, ``within``,
-    all in ``unit``.
-    """
+    """One statistic: ``values`` per frame, the ``tolerance`` of a change, the greatest magnitude ``within``, all in ``unit``."""
 
     tolerance: float = Field(ge=0)
     unit: str

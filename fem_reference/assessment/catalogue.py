@@ -160,9 +160,7 @@ def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of the
-    packages behind them.
-    """
+    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of packages."""
 
     results: tuple[Result, ...]
     seconds: float

@@ -49,9 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of tetrahedra (the reference's, the finer ones); ``missing``: by case, the reason of
-    omission.
-    """
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has none."""
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]

@@ -113,9 +113,7 @@ class Comparison:
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
 
     def word_of(self, name: str) -> Word:
-        """The verdict on a run by its name; the reference fails where it did not converge, in spite of expectations that it
-        meets.
-        """
+        """The verdict on a run by its name; a reference that did not converge fails, even where it meets its expectations."""
         found = overall(one.word for one in self.verdicts if one.expectation.of == name)
         if name != "reference":
             return found
@@ -171,9 +169,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference. A muscle has none, as all its measures take their context from
-    one.
-    """
+    """The measures and verdicts of a ``run`` without a reference; none of a muscle, whose measures need the context of one."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
     measures = measure(run, run, context_of(setup, run), names(case.standards("reference")))

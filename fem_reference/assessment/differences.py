@@ -20,9 +20,7 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), over the frames where both are known; NaN where
-    the scale is 0.
-    """
+    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), where both are known; NaN where the scale is 0."""
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
@@ -41,9 +39,7 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def _median_share(apart: Floats, moved: Floats) -> float:
-    """The distance ``apart`` (f,) of surfaces over their motion ``moved`` (f,), in the median frame with motion; 0 without
-    any.
-    """
+    """The distance ``apart`` (f,) of surfaces over their motion ``moved`` (f,), in the median moving frame; 0 without any."""
     known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
     return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
 

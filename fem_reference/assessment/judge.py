@@ -79,9 +79,7 @@ def overall(words: Iterable[Word]) -> Word:
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference, in words: it did not reach all frames, is unstable, is nearly inverted, left the range of its
-    laws, or lost energy.
-    """
+    """Reasons to doubt a reference, in words: frames it lacks, instability, near inversion, laws out of range, lost energy."""
     said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())

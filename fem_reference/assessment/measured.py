@@ -45,9 +45,7 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The reference's folder in the store, whose name depends on scene, settings and code; its solver where it has no
-        folder.
-        """
+        """The folder of the reference in the store, named by scene, settings and code; its solver where it has no folder."""
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 

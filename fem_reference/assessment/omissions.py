@@ -50,9 +50,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run called ``name`` by ``solver``: the ``whole``, the runs with each omission and with all; ``kept``: names of things
-    that are never omitted.
-    """
+    """A run ``name`` by ``solver``: the ``whole``, and with each of the ``omissions``; ``kept``: names of what is never omitted."""
 
     name: str
     solver: str

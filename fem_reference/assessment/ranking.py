@@ -19,9 +19,7 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be distinguished from
-    it.
-    """
+    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be told apart from it."""
 
     deviation: Deviation
     first: int

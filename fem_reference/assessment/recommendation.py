@@ -1,6 +1,4 @@
-"""Recommendation of a setting for an error or a time: the cheapest or most accurate measured one, on the case itself or on the
-most similar cases.
-"""
+"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -135,9 +133,7 @@ def _measured(study: CaseStudy, metric: str) -> list[Expected]:
 def _expected(
     features: Mapping[str, float], studies: Sequence[CaseStudy], metric: str, margins: Margins
 ) -> Iterable[Expected]:
-    """The settings that were measured on all of the most similar cases. Errors scale with the motion, times with the triangles;
-    the worst of the cases counts.
-    """
+    """The settings measured on all of the most similar cases: the worst errors, scaled by motion, and times, by triangles."""
     chosen = alike(features, studies)
     by_key = [
         {setting(one.point, study): one for one in _measured(study, metric) if is_elsewhere(one.point)}
@@ -165,9 +161,7 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
-    """A point of a studied case, translated to another: tetrahedra relative to the size of the case's own, doubled for each
-    refinement below zero.
-    """
+    """A point of a study for another case: tetrahedra relative to its own, doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point

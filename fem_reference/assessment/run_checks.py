@@ -251,9 +251,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; minus that at rest, where this exceeds the give of contact. Never up to the middle of
-    a bone.
-    """
+    """Penetration of a bone and the muscle, minus that at rest where above the give of contact; never up to a bone's middle."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

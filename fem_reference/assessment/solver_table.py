@@ -109,9 +109,7 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The ``results`` of all solvers on all ``scenarios``; ``missing``: by case, the reason of omission; the ``machines`` of the
-    runs.
-    """
+    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it is left out; the ``machines`` of the runs."""
 
     kinds: tuple[SolverKind, ...]
     scenarios: tuple[Scenario, ...]

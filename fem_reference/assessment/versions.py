@@ -77,9 +77,7 @@ class Change:
 
     @property
     def word(self) -> Word:
-        """The verdict on the change. A change below rounding or the error bar is neither; "mixed" is nearer in some frames and
-        farther away in others.
-        """
+        """The verdict on the change, neutral below rounding or the error bar; "mixed" is nearer in some frames, farther in some."""
         if math.isnan(self.by):
             return "no number"
         if abs(self.by) <= 10.0 ** -PLACES[self.unit]:

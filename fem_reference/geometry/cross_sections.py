@@ -136,8 +136,9 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
-    one, two = (_flat(section.points[section.rim], normal) for section in (known, other))
-    old, new = (_shares(section.points[section.rim]) for section in (known, other))
+    rims = [section.points[section.rim] for section in (known, other)]
+    one, two = (rim - np.outer(rim @ normal, normal) for rim in rims)
+    old, new = (_shares(rim) for rim in rims)
     begin = _continued(np.zeros(1), turns, old)
     start = _nearest(two, new, _at(begin, old, one)[0])
     at = np.arange(_SAMPLES) / _SAMPLES
@@ -145,10 +146,6 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
     relative = new - start
     place = begin + relative + np.interp(relative, at, ahead, period=1)
     return _continued(place, old, turns) % 1
-
-
-def _flat(points: Floats, normal: Floats) -> Floats:
-    return points - np.outer(points @ normal, normal)
 
 
 def _shares(rim: Floats) -> Floats:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 import skfem
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
@@ -199,9 +198,9 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
         if len(going) == 0:
             break
     lasts = np.array([line[-1] for line in lines])
-    square, _, closest = igl.point_mesh_squared_distance(lasts, field.mesh.points, goal)
-    whole = [np.array([*line, point]) for line, point in zip(lines, closest, strict=True)]
-    return whole, np.sqrt(square) <= field.size / 2
+    ends = distances(lasts, Surface(field.mesh.points, goal))
+    whole = [np.array([*line, point]) for line, point in zip(lines, ends.closest, strict=True)]
+    return whole, ends.distance <= field.size / 2
 
 
 def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:

@@ -44,9 +44,7 @@ class GaussianSurface:
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
 
     def project(self, points: Floats, levels: Floats | float = 0.0) -> Floats:
-        """``points`` (n, 3) moved along the gradient to where the level is ``levels`` (n,), by Newton's method; each step is at
-        most the least radius.
-        """
+        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton's method, each step at most the least radius."""
         longest = float(self.radii.min())
         for _ in range(_PROJECTIONS):
             level, gradient, _ = self.level(points)

@@ -22,9 +22,7 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """A surface whose triangles each belong to one part: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,)
-    marks the points where parts meet.
-    """
+    """Triangles in parts: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,) marks points where parts meet."""
 
     points: Floats
     triangles: Ints

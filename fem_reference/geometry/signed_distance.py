@@ -158,9 +158,7 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` with the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that it depends on,
-    including this file.
-    """
+    """The grid of :func:`build` at the spacing of :func:`resolve`, kept in ``folder`` under a hash of all that it depends on."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 

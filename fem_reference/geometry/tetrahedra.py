@@ -114,9 +114,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
 
 
 def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
-    """The triangles of ``coarse`` with each label, by name; empty where it has no rims or the mesh does not begin with its
-    points.
-    """
+    """The triangles of ``coarse`` with each label, by name; empty without rims, or if the mesh does not begin with its points."""
     count = len(coarse.points)
     if not labels.any() or not np.array_equal(mesh.points[:count], coarse.points):
         return {}

@@ -165,9 +165,7 @@ def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
 @overload
 def context_of(setup: CaseSetup, reference: Run) -> Context: ...
 def context_of(setup: CaseSetup, reference: Run) -> Context:
-    """The :data:`Context` of the runs of a case from its ``setup`` and ``reference``; InputError where the reference of a muscle
-    lacks its surface or its fibres.
-    """
+    """The :data:`Context` of a case's runs; InputError where the ``reference`` of a muscle lacks its surface or its fibres."""
     if "field" in reference.carries:
         return FieldContext(setup.exact)
     if not reference.has_surface:

@@ -190,9 +190,7 @@ def assembled(
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """Spacing and errors [mm] of bones' distance grids; InputError where the bones and the surface do not allow
-    contact.
-    """
+    """Spacing and errors [mm] of bones' distance grids; InputError where bones and surface do not allow contact."""
     pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
     check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
     check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))

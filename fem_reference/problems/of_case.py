@@ -117,9 +117,7 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``
-    with their reasons.
-    """
+    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``."""
     if not isinstance(case, MuscleCase) or case.choice == "listed":
         return case
     found = explained(case, rest)

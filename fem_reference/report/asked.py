@@ -55,9 +55,7 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page into ``folder`` where nothing else is lost, and the index; its path and what is printed. A ``name`` that was
-    given takes the place of the default.
-    """
+    """Write a page, as ``name`` where that is given, and the index, where nothing else is lost; its path and what is printed."""
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"

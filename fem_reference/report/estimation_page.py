@@ -115,9 +115,7 @@ def _curves(found: Estimation) -> Drawing:
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """The level of two Gaussians of radius 1 in a plane through both: coordinates along (n,) and across (m,), and the
-    level (m, n), positive inside.
-    """
+    """The level (m, n) of two Gaussians of radius 1, positive inside, in a plane: at coordinates along (n,) and across (m,)."""
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))

@@ -89,9 +89,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a headline in Markdown, with the reason ``why`` nothing was judged: older files would
-    mislead.
-    """
+    """A JUnit suite with one error, and a headline in Markdown, that say ``why`` nothing was judged: older files would mislead."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})

@@ -86,9 +86,7 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in the tetrahedra ``tets``
-        (n,).
-        """
+        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in tetrahedra ``tets`` (n,)."""
         state = self._state(frame)
         wanted = self._checked(names, state)
         acting = [(effect, effect.amount(frame)) for effect in self.effects]

@@ -153,9 +153,7 @@ class Case(Record):
         return sorted(set(re.findall(r'"data:([^"]+)"', known)))
 
     def file(self, text: str, key: str) -> Path:
-        """The file that a ``key`` names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the folder of
-        the case.
-        """
+        """The file of a ``key``: below the data folder (``data:``), below meshes (``mesh:``), or relative to the case's folder."""
         place = join(self.place, key)
         if text.startswith("data:"):
             root = os.environ.get(DATA_SETTING)

@@ -65,9 +65,7 @@ _OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
-    """All techniques on all cases; with a ``store`` of runs also the reference's answers with each decomposition, at the quick size
-    of each case.
-    """
+    """All techniques on all cases; with a ``store``, the reference's answers with each decomposition, at each case's quick size."""
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
