@@ -12,11 +12,12 @@ from pydantic import Field
 
 from fem_reference import metrics
 from fem_reference.assessment.differences import greatest
-from fem_reference.assessment.measured import CurrentMeasures, sample
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
 from fem_reference.foundations.version import __version__
+from fem_reference.geometry.distance import farthest_points
 from fem_reference.io import files, texts
 from fem_reference.metrics import Measure
 from fem_reference.scenes.muscle import MuscleCase
@@ -118,7 +119,7 @@ def update(path: Path, current: CurrentMeasures) -> Baseline:
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
     kept = {} if before is None else before.measures
-    vertices = sample(current.rest, SAMPLED)
+    vertices = farthest_points(current.rest, SAMPLED)
     baseline = Baseline(
         candidate=current.candidate.name,
         case=current.scene.name,

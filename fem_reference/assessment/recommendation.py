@@ -1,14 +1,16 @@
-"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases."""
+"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and
+the transfer of settings, whose tetrahedra differ in size, to a case that is left out.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from statistics import fmean
 
 import numpy as np
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import TETRAHEDRA, Point
-from fem_reference.assessment.transfer import is_elsewhere, setting, tetrahedra
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
@@ -107,14 +109,15 @@ def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
 
 
 def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most like one with these features, the most alike first."""
-    return sorted(studies, key=lambda study: _distance(features, study.features))[:_ALIKE]
+    """The studies of the cases most like one with these features, the most alike first: by ratios, in powers of two; cases with
+    and without contact are far apart.
+    """
 
+    def distance(study: CaseStudy) -> float:
+        pairs = [(_compared(features, name), _compared(study.features, name)) for name in _COMPARED]
+        return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
 
-def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Distance of two cases: over ratios, in powers of two; cases with and without contact are far apart."""
-    pairs = [(_compared(one, name), _compared(other, name)) for name in _COMPARED]
-    return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
+    return sorted(studies, key=distance)[:_ALIKE]
 
 
 def _compared(features: Mapping[str, float], name: str) -> float:
@@ -185,3 +188,87 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
     if not errors:
         return Margins(2.0, 2.0)  # a single study shows nothing about others
     return Margins(*(max(1.0, float(np.quantile(ratios, _MET))) for ratios in (errors, times)))
+
+
+def setting(point: Point, study: CaseStudy) -> str:
+    """A key that identifies a setting across cases; tetrahedra count by their size relative to the case's own reference."""
+    scene = point.choice.get("scene", {})
+    if not is_elsewhere(point):
+        return f"{study.case}: {point.label}"
+    if "triangles" in scene:
+        return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
+    if scene:
+        factor, fewer = tetrahedra(point, study)
+        return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
+    return f"{point.solver}: {_settings(point)}"
+
+
+def is_elsewhere(point: Point) -> bool:
+    """True where a setting can be used on another case: only mesh keys of a scene are transferable."""
+    return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
+
+
+def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
+    """The size of a point's tetrahedra relative to the case's own before refinement, and its difference in refinements."""
+    scene = point.choice["scene"]
+    size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
+    return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
+
+
+def _settings(point: Point) -> str:
+    own = {name: value for name, value in point.choice.items() if name not in ("scene", "solver", "name")}
+    return ", ".join(f"{name} = {value}" for name, value in sorted(own.items(), key=str))
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and applied to that: their ``error`` there, the
+    ``best`` error of any of the same settings there, and that of the ``default`` (NaN where there is none).
+    """
+
+    solver: str
+    left_out: str
+    chosen: str
+    error: float
+    best: float
+    default: float
+
+    @property
+    def loss(self) -> float:
+        """The error over the least possible, minus one: 0 where the chosen settings are the best there too."""
+        return self.error / self.best - 1
+
+
+def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
+    """For every solver and case, the settings with the least mean logarithm of the error over the other cases, among those
+    measured on every case; an error below the bar of a truth counts as the bar.
+    """
+    by_solver: dict[str, dict[str, dict[str, float]]] = {}
+    defaults: dict[tuple[str, str], float] = {}
+    labels: dict[tuple[str, str], str] = {}
+    for study in studies:
+        for point in study.counted:
+            value = point.errors.get(error, math.nan)
+            if point.status != "converged" or not value > 0 or not is_elsewhere(point):
+                continue
+            key = setting(point, study)
+            labels[key, study.case] = point.label
+            by_solver.setdefault(point.solver, {}).setdefault(key, {})[study.case] = value
+            if point.is_default:
+                defaults.setdefault((point.solver, study.case), value)
+    found = list[Transfer]()
+    for solver, settings in by_solver.items():
+        cases = sorted({case for values in settings.values() for case in values})
+        everywhere = {label: values for label, values in settings.items() if len(values) == len(cases)}
+        for left_out in cases if len(cases) > 1 and everywhere else ():
+            chosen = _chosen(everywhere, cases, left_out)
+            errors = everywhere[chosen][left_out], min(values[left_out] for values in everywhere.values())
+            default = defaults.get((solver, left_out), math.nan)
+            found.append(Transfer(solver, left_out, labels[chosen, left_out], *errors, default))
+    return tuple(found)
+
+
+def _chosen(settings: dict[str, dict[str, float]], cases: Iterable[str], left_out: str) -> str:
+    """The key of the settings with the least mean logarithm of the error over all ``cases`` but the one ``left_out``."""
+    others = [case for case in cases if case != left_out]
+    return min(settings, key=lambda label: fmean(math.log(settings[label][case]) for case in others))

@@ -1,4 +1,4 @@
-"""Exact unsigned distance from points to a triangle surface, and winding numbers of closed surfaces."""
+"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and points that are far apart."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -98,3 +98,13 @@ def outer_windings(surface: Surface) -> Floats:
         return np.full(len(triangles), np.nan)
     outside = corners.sum(axis=1) / 3 + step * across / np.where(sizes > 0, sizes, 1)[:, None]
     return np.where(sizes > 0, np.round(igl.fast_winding_number(points, triangles, outside)), np.nan)
+
+
+def farthest_points(points: Floats, count: int) -> Ints:
+    """The indices (count,) of ``points`` (n, d): the farthest from their mean first, then each the farthest from those before."""
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    away = np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(away)))
+    return np.array(chosen)

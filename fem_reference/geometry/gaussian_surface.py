@@ -10,7 +10,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import logsumexp
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
+from fem_reference.geometry.distance import farthest_points
 
 # Points inside the surface from which the first centres are made, and vertices that the fit looks at.
 _INSIDE, _SAMPLES = 20_000, 1500
@@ -96,16 +97,6 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
             max_nfev=_STEPS,
         ).x
     return _surface(unknowns)
-
-
-def farthest_points(points: Floats, count: int) -> Ints:
-    """The indices (count,) of ``points`` (n, d): the farthest from their mean first, then each the farthest from those before."""
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    away = np.full(len(points), np.inf)
-    while len(chosen) < min(count, len(points)):
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
-        chosen.append(int(np.argmax(away)))
-    return np.array(chosen)
 
 
 def _surface(unknowns: Floats) -> GaussianSurface:

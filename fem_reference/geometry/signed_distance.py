@@ -129,7 +129,9 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
     ``rounding`` is the standard deviation s [mm] of a Gaussian mean of the distance, as contact does not slide smoothly along
     flat triangles; where the surface has a mean curvature of 1/r, it moves inward by s^2/r. It counts as error.
     """
-    surface = _oriented(surface)
+    check_finite(surface)
+    outward, _ = igl.bfs_orient(surface.triangles)
+    surface = check_closed(Surface(surface.points, outward, surface.place))
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
     if rounding > 0:
@@ -172,13 +174,6 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
 def _grid(arrays: dict[str, Any]) -> Grid:
     numbers = (float(arrays[name]) for name in ("spacing", "margin", "error", "mean_error"))
     return Grid(arrays["coefficients"], tuple(arrays["origin"].tolist()), *numbers)
-
-
-def _oriented(surface: Surface) -> Surface:
-    """A closed surface whose triangles are all oriented outward."""
-    check_finite(surface)
-    triangles, _ = igl.bfs_orient(surface.triangles)
-    return check_closed(Surface(surface.points, triangles, surface.place))
 
 
 def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tuple[int, ...]]:

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -253,12 +252,8 @@ def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints
     )
 
 
-def _work(job: Path, result: Path) -> None:
-    with np.load(job, allow_pickle=False) as given:
+if __name__ == "__main__":
+    with np.load(sys.argv[1], allow_pickle=False) as given:
         mesher = {"gmsh": _gmsh, "tetwild": _tetwild}[str(given["mesher"])]
         points, tets = mesher(given["points"], given["triangles"], float(given["size"]))
-    np.savez(result, points=points, tets=tets)
-
-
-if __name__ == "__main__":
-    _work(Path(sys.argv[1]), Path(sys.argv[2]))
+    np.savez(sys.argv[2], points=points, tets=tets)

@@ -10,12 +10,13 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.foundations.records import join
+from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibre_templates import contours, mapped
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
-from fem_reference.geometry.patches import draped, fan
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.geometry.skins import edge_lengths
 from fem_reference.geometry.surface_fibres import between
 from fem_reference.io import files
 from fem_reference.scenes.fibres import PolylineFile
@@ -23,6 +24,10 @@ from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
+# The most triangles of a draped patch: those of a patch of some metres.
+_MOST_TRIANGLES = 2**20
+# The longest side [mm] of the triangles of a draped patch.
+_SIDE = 2.0
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
@@ -99,6 +104,37 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
     starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
     triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
     return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
+
+
+def draped(patches: Surface, bone_surface: Surface) -> Surface:
+    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the
+    bone.
+
+    Landmarks lie on the bone, but the triangles between them do not in a hollow: over the iliac fossa they are 13 mm off, more
+    than the thickness of the muscle there.
+    """
+    longest = _longest_side(patches)
+    if len(patches.triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
+        got = f"landmarks {longest:.4g} mm apart"
+        raise InputError(patches.place, got, "those around one attachment, in the unit stated")
+    while _longest_side(patches) > _SIDE:
+        patches = resampled(patches, 1)
+    return patches.moved_to(distances(patches.points, bone_surface).closest)
+
+
+@np.errstate(over="ignore")  # squares overflow for a point that is infinitely far away
+def _longest_side(surface: Surface) -> float:
+    return float(edge_lengths(surface.points[surface.triangles]).max())
+
+
+def fan(points: Floats) -> Surface:
+    """Triangles from the centroid of ``points`` (n, 3) to each two successive ones by angle in their best-fit plane."""
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre)
+    x, y, _ = axes @ (points - centre).T
+    ring = np.argsort(np.arctan2(y, x), kind="stable")
+    triangles = np.stack([np.full(len(ring), len(points)), ring, np.roll(ring, -1)], axis=1)
+    return Surface(np.concatenate([points, centre[None]]), triangles)
 
 
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
+from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.limits import ENERGY_GAP
-from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
@@ -92,11 +92,6 @@ def widest(bar: ErrorBar, measure: Measure | None) -> int:
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest
     return replace(bar, values=np.where(np.isfinite(measure.values), bar.values, -1.0)).widest
-
-
-def greatest(values: Floats) -> float:
-    """The greatest of the ``values`` (f,) that are numbers, NaN where none is finite."""
-    return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
 
 
 def gap(run: Run) -> float:

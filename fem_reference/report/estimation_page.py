@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
 from fem_reference.io.texts import plain
-from fem_reference.metrics import Statistic, described
+from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
@@ -24,10 +24,11 @@ _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]]
 
 def page(found: Estimation) -> Page:
     """The page of the errors of estimation techniques."""
+    answers = {".".join(key): one for key, one in described().items()}
     contents = {
         "found": found,
         "techniques": TECHNIQUES,
-        "answers": _columns(found),
+        "answers": {name: answers[name] for one in found.answers for name in one.changes},
         "fibres": _rows(found.curves, "case", "known"),
         "areas": _rows(found.heights, "case", "attachment", "centres"),
         "choices": dict.fromkeys(one.choice for one in found.heights),
@@ -41,12 +42,6 @@ def page(found: Estimation) -> Page:
     return Page(
         "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
     )
-
-
-def _columns(found: Estimation) -> dict[str, Statistic]:
-    """The statistics of answers that are known, by ``metric.statistic``."""
-    names = dict.fromkeys(name for one in found.answers for name in one.changes)
-    return {name: described()[metric, statistic] for name in names for metric, _, statistic in [name.partition(".")]}
 
 
 def said(found: Estimation) -> str:

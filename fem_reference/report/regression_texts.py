@@ -146,12 +146,9 @@ def _answers(check: Check) -> list[str]:
 
 
 def _cells(one: Judgement) -> tuple[str, ...]:
-    numbers = (_text(value, one.unit) for value in (one.was, one.current, one.allowed, one.known))
-    return (one.word, one.question, one.name, str(one.frame), *numbers)
-
-
-def _text(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}" if math.isfinite(value) else "none"
+    numbers = (one.was, one.current, one.allowed, one.known)
+    texts = (f"{value:.4g} {one.unit}" if math.isfinite(value) else "none" for value in numbers)
+    return (one.word, one.question, one.name, str(one.frame), *texts)
 
 
 def _escaped(cell: str) -> str:

@@ -12,7 +12,7 @@ from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
-from fem_reference.assessment.transfer import transfers
+from fem_reference.assessment.recommendation import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing

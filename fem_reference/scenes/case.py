@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -178,7 +178,7 @@ class Case(Record):
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
         folders = [self.folder, HOME / "meshes", *map(Path, filter(None, settings.split(os.pathsep)))]
-        if not is_inside(path, folders):
+        if not any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
             want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
@@ -214,11 +214,6 @@ def _exists(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long, or with a null character
         return False
-
-
-def is_inside(path: Path, folders: Iterable[Path]) -> bool:
-    """True where ``path``, links followed, is in one of the ``folders``."""
-    return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
 def _unnamed(tables: Any, names: Collection[str]) -> Any:

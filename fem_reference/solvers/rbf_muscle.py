@@ -24,7 +24,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.geometry.gaussian_surface import GaussianSurface, farthest_points, fit
+from fem_reference.geometry.distance import farthest_points
+from fem_reference.geometry.gaussian_surface import GaussianSurface, fit
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.arap import GlobalStep

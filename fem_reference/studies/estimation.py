@@ -5,7 +5,7 @@ what the reference answers with each.
 """
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -86,20 +86,16 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
     lines = [fibres.points[low:high] for low, high in pairwise(fibres.offsets)]
     for known in (count for count in KNOWN if all(len(line) >= count + 2 for line in lines)):
         for technique, (make, _) in TECHNIQUES.items():
-            off = np.concatenate(
-                [_beside(make(line[some]), line, some) for line in lines for some in [_spread(line, known)]]
-            )
+            off = np.concatenate([_off(line, known, make) for line in lines])
             yield CurveError(case, technique, known, float(np.sqrt(np.mean(off**2))), float(off.max()))
 
 
-def _spread(line: Floats, known: int) -> Ints:
-    """The indices (known,) of points of a ``line`` (n, 3) that are spread over it evenly, with both ends."""
-    return np.rint(np.linspace(0, len(line) - 1, known)).astype(np.int64)
-
-
-def _beside(curve: Curve, line: Floats, known: Ints) -> Floats:
-    """The distances (k,) [mm] of the other points of a ``line`` (n, 3) from a curve."""
-    away, _ = cKDTree(curve(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
+def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
+    """The distances (k,) [mm] of points of a ``line`` (n, 3) from the curve that ``make`` makes of its ends and others, ``count``
+    in all, spread evenly.
+    """
+    known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
+    away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
 
 
@@ -153,7 +149,9 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
     """
     # Candidates may not fit other fibres.
     alone = case.model_copy(update={"candidate": ()})
-    scenes = variants(alone if any("fibre" in one.needs for one in case.effects) else _pulling(alone))
+    if not any("fibre" in one.needs for one in case.effects):
+        alone = alone.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
+    scenes = variants(alone)
     if LAPLACE not in scenes:
         return
     log.info("%s: the reference with fibres of the Laplace field", case.name)
@@ -168,11 +166,6 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
             found = cost.greatest(_carrying(run), _carrying(base), context, {name.split(".")[0] for name in ANSWERS})
         picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, cost.known(bars)))
         yield AnswerChange(case.name, source, LAPLACE, run.outcome.status, *picked)
-
-
-def _pulling(case: MuscleCase) -> MuscleCase:
-    """The case with fibres that resist stretch."""
-    return case.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
 
 
 def _carrying(run: Run) -> Run:

@@ -1,4 +1,4 @@
-"""Attachments and fibres of a case: what a file lists, what lies near, and where lines and directions are."""
+"""Attachments and fibres of a case: what a file lists, what lies near, patches of landmarks, and where lines and directions are."""
 
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, TetMesh, check_closed, triangle_areas, vertex_areas
+from fem_reference.geometry.distance import distances
 from fem_reference.geometry.sectors import attached_shares
+from fem_reference.geometry.skins import edge_lengths
 from fem_reference.io import files
 from fem_reference.problems import anatomy, muscle
-from fem_reference.problems.anatomy import facets_under, pick
+from fem_reference.problems.anatomy import draped, facets_under, fan, pick
 from fem_reference.problems.estimates import estimates
 from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Fibres
@@ -335,3 +337,31 @@ def test_fibres_between_those_in_files_are_a_source(bar) -> None:
     found, _ = anatomy.fibres_of(case, surface, lambda _: pytest.fail("it was meshed"))
     assert found.lengths() == pytest.approx(np.full(6, 40.0))
     assert anatomy.lean(case, np.array([0, 0, 1.0])) == pytest.approx(0, abs=1e-9)
+
+
+BALL = shapes.sphere(3, 30.0)
+ANGLES = np.linspace(0, 2 * np.pi, 9)[:-1]
+LANDMARKS = 10 * np.column_stack([np.cos(ANGLES), np.sin(ANGLES), np.zeros(8)])
+
+
+def test_a_fan_covers_the_polygon_of_its_points_in_any_order() -> None:
+    order = np.random.default_rng(0).permutation(8)
+    patch = fan(LANDMARKS[order] @ np.linalg.qr(np.arange(9.0).reshape(3, 3) + np.eye(3))[0] + [5, 6, 7])
+    assert len(patch.triangles) == 8
+    assert triangle_areas(patch.points, patch.triangles).sum() == pytest.approx(8 * 50 * np.sin(np.pi / 4))
+
+
+def test_a_patch_lies_on_the_bone_in_small_triangles() -> None:
+    patch = draped(fan(LANDMARKS + [0, 0, 25]), BALL)
+    assert distances(patch.points, BALL).distance.max() < 1e-9
+    assert edge_lengths(patch.points[patch.triangles]).max() < 3
+    # The cap of a sphere of 30 mm within 10 mm of its axis, and a little less of a polygon.
+    cap = 2 * np.pi * 30 * (30 - np.sqrt(30**2 - 10**2))
+    assert triangle_areas(patch.points, patch.triangles).sum() == pytest.approx(cap, rel=0.2)
+
+
+@pytest.mark.parametrize(("far", "apart"), [(1e6, r"1e\+06"), (1e200, "inf")])
+def test_landmarks_a_kilometre_apart_are_refused(far: float, apart: str) -> None:
+    points = np.array([[0, 0, 0], [30, 0, 0], [0, 30, 0], [far, 0, 0.0]])
+    with pytest.raises(InputError, match=rf"got landmarks {apart} mm apart, want those around one attachment"):
+        draped(fan(points), BALL)

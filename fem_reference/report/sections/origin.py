@@ -13,11 +13,11 @@ from fem_reference.scenes.case import Case
 
 def facts(comparison: Comparison) -> dict[str, Any]:
     """Origins as one table each, and the scene."""
-    scene = comparison.scene
+    path = Path(comparison.scene.place)
     origins = [
         (run, _flat({key: value for key, value in run.origin.items() if key != RECORD})) for run in comparison.runs
     ]
-    return {"origins": origins, "scene_text": _scene_text(scene)}
+    return {"origins": origins, "scene_text": path.read_text(encoding="utf-8") if path.is_file() else ""}
 
 
 def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
@@ -55,8 +55,3 @@ def _numbered(value: Any) -> Any:
     if isinstance(value, list):
         return {f"[{i}]": _numbered(inside) for i, inside in enumerate(value)}
     return value
-
-
-def _scene_text(case: Case) -> str:
-    path = Path(case.place)
-    return path.read_text(encoding="utf-8") if path.is_file() else ""
