@@ -161,13 +161,12 @@ def _check_shape(place: str, baseline: Baseline) -> None:
     """Raise InputError unless all lists that belong together are equally long, and every statistic exists."""
     known, frames = metrics.units(), len(baseline.frames)
     for name, stored in baseline.measures.items():
+        key = f"{place}: measures.{name}"
         if known.get(name) != stored.unit:
             want = "a statistic that there is" + (f", in {known[name]}" if name in known else "")
-            raise InputError(f"{place}: measures.{name}", f'one in "{stored.unit}"', want)
+            raise InputError(key, f'one in "{stored.unit}"', want)
         if len(stored.values) != frames:
-            raise InputError(
-                f"{place}: measures.{name}.values", f"{len(stored.values)} values", f"{frames}, one a frame"
-            )
+            raise InputError(f"{key}.values", f"{len(stored.values)} values", f"{frames}, one a frame")
     positions = baseline.positions
     if len(positions.values) != frames or {len(row) for row in positions.values} != {len(positions.vertices)}:
         want = f"{len(positions.vertices)} vertices in each of {frames} frames"
@@ -186,9 +185,8 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
     tolerance, within = limits(one, bars)
     if before is not None:
         tolerance, within = before.tolerance, within if before.within is None else before.within
-    values = tuple(
-        round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
-    )
+    digits = PLACES[one.unit]
+    values = tuple(round(value, digits) + 0.0 if math.isfinite(value) else None for value in one.values.tolist())
     return StoredStatistic(tolerance=tolerance, unit=one.unit, values=values, within=within)
 
 

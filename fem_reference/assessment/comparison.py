@@ -139,9 +139,8 @@ def compare(
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
-    deviations = {
-        run.name: _with_bars(measure(run, reference, context, candidate), "deviation", error_bars) for run in candidates
-    }
+    apart = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    deviations = {name: _with_bars(found, "deviation", error_bars) for name, found in apart.items()}
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
     changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations

@@ -92,9 +92,8 @@ class ErrorBars:
     @property
     def of_deviations(self) -> tuple[Measure, ...]:
         """The error bars of deviations from the reference, as measures."""
-        return tuple(
-            Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in self.bars if bar.of == "deviation"
-        )
+        bars = (bar for bar in self.bars if bar.of == "deviation")
+        return tuple(Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in bars)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,9 +244,8 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
     left = SAFETY * VARIATION
 
     def vectors(kind: str) -> dict[str, Floats]:
-        ends = {
-            name: [[getattr(one, kind)[name] for one in pair] for pair in pairs] for name in getattr(states[0], kind)
-        }
+        names = getattr(states[0], kind)
+        ends = {name: [[getattr(one, kind)[name] for one in pair] for pair in pairs] for name in names}
         return {name: left * np.linalg.norm(np.diff(ways, axis=1)[:, 0], axis=1) for name, ways in ends.items()}
 
     points = left * np.array([np.linalg.norm(one.points - other.points, axis=1) for one, other in pairs])
@@ -262,8 +260,7 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
 def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
     """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
     if other is None:
-        blank: dict[str, Any] = {
-            kind: {name: np.full(3, np.nan) for name in getattr(state, kind)} for kind in ("forces", "moments")
-        }
+        lost = np.full(3, np.nan)
+        blank: dict[str, Any] = {kind: dict.fromkeys(getattr(state, kind), lost) for kind in ("forces", "moments")}
         return replace(state, points=np.full_like(state.points, np.nan), scalars={"energy": np.nan}, **blank)
     return replace(other, points=np.where(shared[:, None] < 0, np.nan, other.points[shared]))

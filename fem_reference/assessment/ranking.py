@@ -60,9 +60,8 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
     for one in ordered:
         better = sum(_less(other, one) for other in ordered)
         worse = sum(_less(one, other) for other in ordered)
-        alike = tuple(
-            other.name for other in ordered if other is not one and not _less(other, one) and not _less(one, other)
-        )
+        others = (other for other in ordered if other is not one)
+        alike = tuple(other.name for other in others if not _less(other, one) and not _less(one, other))
         found.append(Ranked(one, better + 1, len(ordered) - worse, alike))
     return tuple(found)
 

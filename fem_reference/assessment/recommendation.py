@@ -14,6 +14,7 @@ from fem_reference.assessment.fronts import TETRAHEDRA, Point
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
+Features = Mapping[str, float]  # of a case, by name
 # The number of most similar other cases that are used.
 _ALIKE = 3
 # The share of expectations from other cases that are met on each left-out case, for the margin.
@@ -68,7 +69,7 @@ class Recommendation:
 
 
 def recommend(
-    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
+    features: Features, case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
     """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the most accurate whose time
     per frame [s] is at most ``limits["time"]``; with both limits, the cheapest within both. Only studies with the metric count.
@@ -80,18 +81,15 @@ def recommend(
     margins = Margins() if own else _margins(others, metric)
     known = _measured(own[0], metric) if own else list(_expected(features, others, metric, margins))
     of = (case,) if own else tuple(study.case for study in alike(features, others))
-    fitting = [
-        one for one in known if one.error <= limits.get("error", math.inf) and one.time <= limits.get("time", math.inf)
-    ]
+    most = {"error": math.inf, "time": math.inf} | dict(limits)
+    fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
     rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
     best = min(fitting, key=rank, default=None)
     nearest = None if best else min(known, key=lambda one: one.misses(limits), default=None)
     return Recommendation(best, nearest, len(known), margins, of, bool(own))
 
 
-def _comparable(
-    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str
-) -> Sequence[CaseStudy]:
+def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
     """The studies that are comparable with these features: lengths scale with the motion of bones, which there must be."""
     if _is_share(metric):
         return studies
@@ -103,12 +101,12 @@ def _comparable(
     return found
 
 
-def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+def _is_same(one: Features, other: Features) -> bool:
     """True where a case has the same features as when it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
-def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[CaseStudy]:
+def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
     """The studies of the cases most like one with these features, the most alike first: by ratios, in powers of two; cases with
     and without contact are far apart.
     """
@@ -120,7 +118,7 @@ def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[C
     return sorted(studies, key=distance)[:_ALIKE]
 
 
-def _compared(features: Mapping[str, float], name: str) -> float:
+def _compared(features: Features, name: str) -> float:
     if name == "motion_to_size":
         return features["motion"] / features["size"]
     return min(features[name], 1.0) if name == "contact" else features[name]
@@ -133,9 +131,7 @@ def _measured(study: CaseStudy, metric: str) -> list[Expected]:
     return [Expected(point, error, time, (study.case,), bar) for point, (error, time) in known]
 
 
-def _expected(
-    features: Mapping[str, float], studies: Sequence[CaseStudy], metric: str, margins: Margins
-) -> Iterable[Expected]:
+def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, margins: Margins) -> Iterable[Expected]:
     """The settings measured on all of the most similar cases: the worst errors, scaled by motion, and times, by triangles."""
     chosen = alike(features, studies)
     by_key = [
@@ -154,7 +150,7 @@ def _expected(
         )
 
 
-def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
+def scale(features: Features, other: Features, metric: str) -> float:
     """The factor from an error on the ``other`` case to one here: lengths scale with the motion, shares do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
@@ -163,7 +159,7 @@ def _is_share(metric: str) -> bool:
     return metric.startswith("volume.") or metric.endswith("_percent")
 
 
-def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
+def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
     """A point of a study for another case: tetrahedra relative to its own, doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):

@@ -90,9 +90,8 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
         return None
     edges, triangles = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     low, high = above[edges].T
-    points = mesh.points[edges[:, 0]] + (low / (low - high))[:, None] * (
-        mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-    )
+    one, other = (mesh.points[ends] for ends in edges.T)
+    points = one + (low / (low - high))[:, None] * (other - one)
     triangles = triangles.reshape(-1, 3)
     turned = np.einsum("ij,ij->i", normals(points[triangles]), rise) < 0
     triangles[turned] = triangles[turned][:, ::-1]

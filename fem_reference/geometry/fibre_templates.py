@@ -58,9 +58,8 @@ class Contours:
         square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
         triangles = triangles[np.linalg.norm(normals(square[triangles]), axis=1) > _FLAT]
         found = distances(np.pad(places, ((0, 0), (0, 1))), Surface(square, triangles))
-        return np.asarray(
-            np.einsum("nk,nkd->nd", found.barycentric, self.sections[i].points[triangles[found.triangle]])
-        )
+        corners = self.sections[i].points[triangles[found.triangle]]
+        return np.asarray(np.einsum("nk,nkd->nd", found.barycentric, corners))
 
 
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:

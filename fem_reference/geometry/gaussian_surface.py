@@ -80,9 +80,8 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
     samples, distances = _samples(surface)
     unknowns = np.concatenate([centres.ravel(), np.log(1.2 * np.sqrt(spread))])
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    within = tuple(
-        np.concatenate([np.tile(box, count), np.full(count, end)]) for box, end in zip((low, high), bounds, strict=True)
-    )
+    boxes = zip((low, high), bounds, strict=True)
+    within = tuple(np.concatenate([np.tile(box, count), np.full(count, end)]) for box, end in boxes)
     for _ in range(_ROUNDS):
         slopes = np.linalg.norm(_surface(unknowns).level(samples)[1], axis=1)
         lengths = 1 / np.maximum(slopes, np.quantile(slopes, 0.05))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -94,7 +95,8 @@ def collapsed(parts: Parts, short: float) -> Parts:
     for one, other in _rim_edges(parts).tolist():
         next_on_rim[one].append(other)
         next_on_rim[other].append(one)
-    around = _around_points(parts.triangles, len(parts.points))
+    faces, starts = igl.vertex_triangle_adjacency(parts.triangles, len(parts.points))
+    around = [some.tolist() for some in np.split(faces, starts[1:-1])]  # the triangles around each point
     target, touched = np.arange(len(parts.points)), np.zeros(len(parts.points), bool)
     gone = np.zeros(len(parts.triangles), bool)
     for i in np.argsort(lengths, kind="stable")[: np.count_nonzero(lengths < short)]:
@@ -117,15 +119,6 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
     return bool(before @ after > _STRAIGHT * np.linalg.norm(before) * np.linalg.norm(after))
-
-
-def _around_points(triangles: Ints, count: int) -> list[list[int]]:
-    """The triangles around each of ``count`` points."""
-    around: list[list[int]] = [[] for _ in range(count)]
-    for i, corners in enumerate(triangles.tolist()):
-        for corner in corners:
-            around[corner].append(i)
-    return around
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:

@@ -171,9 +171,8 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if not reference.has_surface:
         raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
     if reference.fibres is None:
-        raise InputError(
-            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
-        )
+        place = f"{reference.name}: fibres"
+        raise InputError(place, "a run without an interior", "a reference that carries the fibres")
     return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
 
 

@@ -216,7 +216,6 @@ def inside(surface: Surface, fibres: Polylines) -> Polylines:
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest
     if away.max() > 0:
-        log.info(
-            "fibres: %d of %d points moved into the muscle, by up to %.1f mm", (away > 0).sum(), len(points), away.max()
-        )
+        moved, most = (away > 0).sum(), away.max()
+        log.info("fibres: %d of %d points moved into the muscle, by up to %.1f mm", moved, len(points), most)
     return Polylines(points, fibres.offsets)

@@ -40,9 +40,8 @@ class Asked:
     def name(self) -> str:
         """The default name."""
         text = "-".join([self.base, *(_plain(part.name) for part in self.parts if part.name)])
-        return (
-            text if len(text) <= LONGEST else f"{text[: LONGEST - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-        )
+        end = f"-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+        return text if len(text) <= LONGEST else text[: LONGEST - len(end)] + end
 
 
 def _plain(text: str) -> str:

@@ -96,9 +96,8 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
 
 def _most(found: CaseOmissions, one: Omission) -> str:
     """The change that is the most error bars."""
-    ratios = {
-        name: ratio for name, ratio in omissions.in_bars(one.changes, found.bars).items() if not math.isnan(ratio)
-    }
+    in_bars = omissions.in_bars(one.changes, found.bars).items()
+    ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
     known = f", known to {number(found.bars[name])} {found.units[name]}," if name in found.bars else ""
     return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
@@ -133,9 +132,8 @@ def drawing(found: CaseOmissions) -> Drawing | None:
 def _points(ablation: Ablation) -> list[tuple[str, float, float]]:
     """The omissions of a run that can be drawn: the name of each, the time saved [%] and the change of the surface [mm]."""
     shares = ((one, ablation.relative(one.seconds)) for one in ablation.omissions if MAIN in one.changes)
-    return [
-        (label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in shares if not math.isnan(share)
-    ]
+    known = [(one, share) for one, share in shares if not math.isnan(share)]
+    return [(label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in known]
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:

@@ -39,19 +39,16 @@ def page(found: Estimation) -> Page:
             *([_fits(found)] if found.fits else []),
         ],
     }
-    return Page(
-        "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
-    )
+    headlines = (("", "", said(found)),)
+    return Page("estimation", "Estimation techniques", headlines, "estimation_page.html", contents, facts(found))
 
 
 def said(found: Estimation) -> str:
     """The best technique for fibres, and the accuracy of Gaussians, where they were measured."""
     sentences = list[str]()
     if found.curves:  # not where all fibres have few points
-        by_technique = {
-            name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES
-        }
-        best = min(by_technique, key=lambda name: float(by_technique[name]))
+        errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
+        best = min(errors, key=lambda name: float(errors[name]))
         sentences.append(f"of curves through a few points of a fibre {best} deviates least")
     most = max((one.gaussians for one in found.fits), default=0)
     if fits := [one for one in found.fits if one.gaussians == most]:

@@ -21,9 +21,8 @@ def page(title: str, examples: tuple[Comparison, ...]) -> Page:
     """The page of scalar examples with the table of differences between the report's text and listings."""
     words = [one.word for one in examples]
     said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
-    return Page(
-        "examples", title, said, "field_page.html", _contents(examples) | {"differences": _section()["difference"]}
-    )
+    contents = _contents(examples) | {"differences": _section()["difference"]}
+    return Page("examples", title, said, "field_page.html", contents)
 
 
 def comparison_page(example: Comparison) -> Page:

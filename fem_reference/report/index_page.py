@@ -52,9 +52,8 @@ def entries_of(folder: Path) -> tuple[list[IndexEntry], list[str]]:
         elif head is not None and head.kind != KIND:
             name = address.removesuffix(".html").removesuffix("/report")
             entries.append(IndexEntry(name, quote(address), head.made or _changed(path), head))
-    return sorted(entries, key=lambda one: (one.made, one.name), reverse=True), [
-        address for address in others if address != f"{NAME}.html"
-    ]
+    entries.sort(key=lambda one: (one.made, one.name), reverse=True)
+    return entries, [address for address in others if address != f"{NAME}.html"]
 
 
 def _changed(path: Path) -> str:

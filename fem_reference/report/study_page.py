@@ -192,8 +192,6 @@ def text(study: Study) -> str:
             known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
             lines.append(f"  {title_of(error)}{known}:")
             lines += [f"    {sentence}" for sentence in sentences(case, error)]
-        lines += [
-            f"  left out: {point.solver}, {point.label}: {point.status}: {point.message}" for point in left_out(case)
-        ]
+        lines += [f"  left out: {one.solver}, {one.label}: {one.status}: {one.message}" for one in left_out(case)]
     lines += [f"left out: {case}: {why}" for case, why in study.missing.items()]
     return "\n".join(lines)

@@ -48,9 +48,8 @@ def text(verification: Verification) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
     layout = list(zip(sides, widths, strict=True))
-    lines = [
-        "  ".join(f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)) for row in rows
-    ]
+    cells = ([f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)] for row in rows)
+    lines = ["  ".join(row) for row in cells]
     return "\n".join([*(line.rstrip() for line in lines), verification.summary])
 
 
@@ -106,16 +105,12 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
 
     def draw(figure: Figure, axes: Axes) -> None:
         row = 0
+        side: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "ha": "right", "va": "center"}
         for group, members in groups.items():
-            axes.text(
-                -0.01, row, words(group), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
-            )
+            axes.text(-0.01, row, words(group), weight="bold", **side)
             axes.axhline(row - 0.7, color="#dddddd", linewidth=0.8)
             for place, one in enumerate(members, row + 1):
-                label = axes.text(
-                    -0.01, place, one.entry.name, transform=axes.get_yaxis_transform(), ha="right", va="center"
-                )
-                label.set_color("#1d1d1f" if one.word == "pass" else FAIL)
+                axes.text(-0.01, place, one.entry.name, color="#1d1d1f" if one.word == "pass" else FAIL, **side)
                 _dot(axes, place, one, (low, high))
             row += len(members) + 1
         axes.set_ylim(row - 0.3, -0.7)

@@ -127,9 +127,8 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 def _greatest_force(runs: list[dict[str, Any]]) -> float:
     """The greatest magnitude [N] of the arrows of all ``runs``, 0 without any."""
-    return max(
-        (float(np.linalg.norm(one[3:])) for row in runs for frame in row["forces"] for one in frame), default=0.0
-    )
+    forces = (one[3:] for row in runs for frame in row["forces"] for one in frame)
+    return max((float(np.linalg.norm(force)) for force in forces), default=0.0)
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:

@@ -88,9 +88,8 @@ def _near(table: dict[str, Any], parts: list[str | int]) -> str:
     for i, part in enumerate(parts):
         if isinstance(inside, list) and not (isinstance(part, int) and part < len(inside)):
             key, names = ".".join(map(str, parts[:i])), [isinstance(one, dict) and one.get("name") for one in inside]
-            return "; there are " + ", ".join(
-                f"{key}[{k}]{f' ({name})' if name else ''}" for k, name in enumerate(names)
-            )
+            labels = [f"{key}[{k}]{f' ({name})' if name else ''}" for k, name in enumerate(names)]
+            return f"; there are {', '.join(labels)}"
         if isinstance(inside, dict) and part not in inside:
             return f"; there are {', '.join(inside)}"
         if not isinstance(inside, list | dict):
@@ -238,9 +237,8 @@ def _check_forces(case: MuscleCase) -> None:
         if contact and attachment.name in bones:
             place = join(case.place, f"attachment[{i}].name")
             raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
-    if not case.attachment and not any(
-        isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects
-    ):
+    stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
+    if not case.attachment and not stays:
         want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
         raise InputError(join(case.place, "attachment"), "none", want)
 
