@@ -6,6 +6,8 @@ own points in place of the fibres'. Its whole length is compared, so it deviates
 than the fibre. That counts as its error, even if its change of length from rest is correct.
 """
 
+from functools import partial
+
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
@@ -14,22 +16,18 @@ from fem_reference.runs.store import Run
 
 _TITLE = "Fibre length"
 # Fibres are few lines that end at rims, so that one of them may be most of their mean square: all statistics are local.
+_of_lines = partial(Statistic, local=True)
 STATISTICS = {
-    "mean": Statistic(
-        "mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}, local=True
-    ),
-    "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 20}, local=True),
-    "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 20}, local=True, lone=True),
-    "mean_percent": Statistic("%", _TITLE, "mean", shown={"claim": 40}, local=True),
-    "rms_percent": Statistic(
-        "%",
-        _TITLE,
-        "rms",
+    "mean": _of_lines("mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}),
+    "rms": _of_lines("mm", _TITLE, "rms", shown={"solvers": 20}),
+    "max": _of_lines("mm", _TITLE, "worst fibre", shown={"table": 20}, lone=True),
+    "mean_percent": _of_lines("%", _TITLE, "mean", shown={"claim": 40}),
+    "rms_percent": _of_lines(
+        *("%", _TITLE, "rms"),
         headline="lengths of fibres by {} rms",
         shown={"main": 20, "headline": 20, "solvers": 30, "scenes": 20, "rank": 20, "claim": 50},
-        local=True,
     ),
-    "max_percent": Statistic("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, local=True, lone=True),
+    "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
 # Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.

@@ -13,16 +13,8 @@ STATISTICS = {
         "Volume",
         headline="volume by {}",
         curve="Change of volume from rest",
-        shown={
-            "main": 10,
-            "table": 10,
-            "headline": 30,
-            "curve": 10,
-            "solvers": 10,
-            "scenes": 10,
-            "rank": 30,
-            "claim": 70,
-        },
+        shown=dict.fromkeys(("main", "table", "curve", "solvers", "scenes"), 10)
+        | {"headline": 30, "rank": 30, "claim": 70},
         local=True,
     ),
     "deviation_volume": Statistic("mm3", local=True),

@@ -18,7 +18,7 @@ from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.drawings import look_of
-from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.pages import Headlines, Page, by_name
 from fem_reference.report.sections import cost, origin
 from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, spread, summary
 from fem_reference.report.viewer import view
@@ -63,23 +63,17 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "runs": comparison.runs,
         "columns": DEVIATIONS,
         "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
-        "curves": curves,
         "bars": known(comparison),
         "spread": spread(comparison),
         "error": error and error.worst,
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,
-        "label_of": label_of,
         "label": partial(label, comparison.scene, comparison.setup),
         "frame_columns": columns(comparison.scene, comparison.setup),
         "changes": origin.changes(comparison.scene),
-        "seconds_per_frame": seconds_per_frame,
-        "inversion": inversion,
-        "greatest": greatest,
-        "widest": widest,
-        "gap": gap,
         "energy_gap_limit": ENERGY_GAP,
         "second_check": second_check.texts_of,
+        **by_name(curves, label_of, seconds_per_frame, inversion, greatest, widest, gap),
         **cost.facts(comparison),
         **origin.facts(comparison),
     }

@@ -10,7 +10,7 @@ from fem_reference.assessment import omissions
 from fem_reference.assessment.omissions import Ablation, CaseOmissions, Omission
 from fem_reference.metrics import described
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
-from fem_reference.report.pages import Page
+from fem_reference.report.pages import Page, by_name
 from fem_reference.report.study_page import title_of
 from fem_reference.report.words import duration, listed, number, words
 
@@ -30,13 +30,11 @@ def page(found: CaseOmissions) -> Page:
         "phases": phases(found),
         "counts": {name: title_of(name) for name in omissions.COUNTS},
         "predicted": any(one.predicted for ablation in found.ablations for one in ablation.omissions),
-        "sentences": sentences,
-        "label": label,
         "judged": lambda one: omissions.verdict(one.changes, found.bars),
         "prediction": lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
         "instead": lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
-        "percent": percent,
         "drawing": drawing(found),
+        **by_name(sentences, label, percent),
     }
     title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
     return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))

@@ -25,6 +25,7 @@ _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]]
 def page(found: Estimation) -> Page:
     """The page of the errors of estimation techniques."""
     answers = {".".join(key): one for key, one in described().items()}
+    drawings = (_figure(), _curves(found) if found.curves else None, _blobs(), _fits(found) if found.fits else None)
     contents = {
         "found": found,
         "techniques": TECHNIQUES,
@@ -32,12 +33,7 @@ def page(found: Estimation) -> Page:
         "fibres": _rows(found.curves, "case", "known"),
         "areas": _rows(found.heights, "case", "attachment", "centres"),
         "choices": dict.fromkeys(one.choice for one in found.heights),
-        "drawings": [
-            _figure(),
-            *([_curves(found)] if found.curves else []),
-            _blobs(),
-            *([_fits(found)] if found.fits else []),
-        ],
+        "drawings": [one for one in drawings if one is not None],
     }
     headlines = (("", "", said(found)),)
     return Page("estimation", "Estimation techniques", headlines, "estimation_page.html", contents, facts(found))

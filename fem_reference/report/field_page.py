@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.judge import overall
 from fem_reference.report import field_figures
-from fem_reference.report.pages import Page
+from fem_reference.report.pages import Page, by_name
 from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
@@ -39,13 +39,7 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
         "word": overall(example.word for example in examples),
         "differences": (),
         "figures_of_report": _section()["figure"],
-        "apart": apart,
-        "bounds": bounds,
-        "seconds": seconds,
-        "pivot": pivot,
-        "form": form,
-        "drawings": field_figures.drawings,
-        "convergence": field_figures.convergence,
+        **by_name(apart, bounds, seconds, pivot, form, field_figures.drawings, field_figures.convergence),
     }
 
 
