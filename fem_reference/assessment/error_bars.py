@@ -20,7 +20,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import files, texts
 from fem_reference.io.texts import plain
-from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
+from fem_reference.metrics import Measure, MeasurementContext, as_surface, change, described, measure, names, of_itself
 from fem_reference.runs.store import Frame, Run
 
 Of = Literal["change", "deviation"]
@@ -124,7 +124,7 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
     of a run itself has no bars: its statistics are exact.
     """
     comparing = [name for name in names() if not of_itself(name)]
-    surface = cache(_surface)
+    surface = cache(as_surface)
 
     @cache
     def measured(run: Run, other: Run | None) -> tuple[Measure, ...]:
@@ -181,11 +181,6 @@ def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
     """The surface distance, rms (f,) [mm], among the ``values`` by statistic."""
     return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
-
-
-def _surface(run: Run) -> Run:
-    """The run as a candidate: a surface without an interior, so that lengths use the measurement context's extension."""
-    return replace(run, fibres=None, fibre_positions=None)
 
 
 def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Floats]:

@@ -268,6 +268,11 @@ def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None =
     return measure(run, at_rest(run), own, wanted)
 
 
+def as_surface(run: Run) -> Run:
+    """The run without an interior: its surface carries the fibres that are measured, as that of a candidate does."""
+    return replace(run, fibres=None, fibre_positions=None)
+
+
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
     """The ``vertices`` (f,) of the mesh of a field and their places, in words."""
     places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)

@@ -6,7 +6,6 @@ what the reference answers with each.
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -29,10 +28,9 @@ from fem_reference.geometry.curves import TECHNIQUES, Curve
 from fem_reference.geometry.fibres import NearestLine
 from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.metrics import context_of
+from fem_reference.metrics import as_surface, context_of
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.setup import Setup
-from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Chmd, Fibres, KohoutKukacka, Traced
 from fem_reference.scenes.muscle import MuscleCase
@@ -163,14 +161,9 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
         run, found = Bench(scene, store).reference(), dict[str, float]()
         if base.outcome.status == run.outcome.status == "converged":
             context = context_of(bench.setup(), base)
-            found = cost.greatest(_carrying(run), _carrying(base), context, {name.split(".")[0] for name in ANSWERS})
+            found = cost.greatest(as_surface(run), as_surface(base), context, {name.split(".")[0] for name in ANSWERS})
         picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, cost.known(bars)))
         yield AnswerChange(case.name, source, LAPLACE, run.outcome.status, *picked)
-
-
-def _carrying(run: Run) -> Run:
-    """The run without fibres of its own: its surface carries those that are measured."""
-    return replace(run, fibres=None, fibre_positions=None)
 
 
 def variants(case: MuscleCase) -> dict[str, MuscleCase]:
