@@ -69,8 +69,7 @@ class Entry:
     where there is one, and the values ``given`` by name. The number must come within ``within`` (in ``unit``, or of the truth's
     size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is that of the truth, ``kind`` its type.
     ``negative_control`` names one mistake, with which ``wrong`` replaces a part of ``given``: it must fail. ``slow``: a
-    measurement takes more than some 4 s, or resembles another one; ``slow_negative_control``: the control does. Tests leave these
-    to the verb verify.
+    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify measures these.
     """
 
     name: str
@@ -115,9 +114,8 @@ def _finding(found: float | Finding) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth; ``error`` is the absolute error and
-    ``within`` its bound, both in the unit of the entry. They are NaN without a measurement or a truth; then the finding's note
-    gives the reason.
+    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth; ``error`` is absolute and ``within`` its
+    bound, both in the unit of the entry, and NaN without a measurement or a truth: then the note of the finding gives the reason.
     """
 
     entry: Entry

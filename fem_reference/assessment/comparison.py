@@ -32,8 +32,7 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest
-    two.
+    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
 
     ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices to the finest
     solution of order 2. ``order`` is NaN where the errors are rounding.

@@ -1,7 +1,6 @@
 """Checks of the states that a solver calls converged, from its recorded positions and forces, independent of its loop.
 
-Every frame is checked. Each check has its allowed value, and the frame and place where it comes nearest to that value, or exceeds
-it most.
+Every frame is checked. A check has its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
 """
 
 import math

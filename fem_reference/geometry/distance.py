@@ -82,9 +82,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive
-    inside another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no
-    normal.
+    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
+    another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.

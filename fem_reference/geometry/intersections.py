@@ -15,8 +15,7 @@ def self_intersections(surface: Surface) -> Ints:
 def self_crossings(surface: Surface) -> Ints:
     """Pairs (k, 2) of triangles where an edge of one pierces the other.
 
-    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap
-    in one plane.
+    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap in one plane.
     """
     _, pairs, _ = predicates.find_self_intersections(np.array(surface.points), np.array(surface.triangles))
     first, second = pairs.T

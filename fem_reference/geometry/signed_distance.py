@@ -122,9 +122,8 @@ def _weights(within: Floats) -> Floats:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within
-    ``margin`` [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in
-    ``check_closed``.
+    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
+    [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in ``check_closed``.
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian mean of the distance, as contact does not slide smoothly along
     flat triangles; where the surface has a mean curvature of 1/r, it moves inward by s^2/r. It counts as error.

@@ -1,7 +1,6 @@
 """Filling of a closed surface with tetrahedra of high quality: the mesh does not keep the vertices of a finer surface.
 
-``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a subprocess, where it may crash, hang or
-keep its global state.
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher, which may crash, hang or keep global state.
 """
 
 import logging
@@ -47,10 +46,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
     by attachment, whose ``shares`` (m, 3) state how much of the corners of triangles is attached; their ``maker`` says who made
     them. InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that
-    does not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it
-    moves with the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue
-    72).
+    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that does
+    not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it moves with
+    the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -79,8 +77,7 @@ def check_size(surface: Surface, size: float) -> None:
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
     """Origin (3,) and axes in columns (3, 3) of the frame that the points span.
 
-    From point 0 to the point farthest from it, and from that line to the point farthest from it; the lowest index where
-    several are equally far.
+    From point 0 to the point farthest from it, and from that line to the farthest from it; of equally far ones to the first.
     """
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]

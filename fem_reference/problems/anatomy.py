@@ -107,8 +107,7 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
-    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the
-    bone.
+    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the bone.
 
     Landmarks lie on the bone, but the triangles between them do not in a hollow: over the iliac fossa they are 13 mm off, more
     than the thickness of the muscle there.

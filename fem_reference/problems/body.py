@@ -65,9 +65,8 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects:
-    its displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs
-    it.
+    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
+    displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs it.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")

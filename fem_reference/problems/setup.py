@@ -35,9 +35,8 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of
-    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its
-    vertices.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
+    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its vertices.
     """
 
     name: str

@@ -87,12 +87,11 @@ class Outcome:
 class Run:
     """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
 
-    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
-    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
-    only moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead,
-    and ``fields`` by name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a
-    body they are the whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested.
-    ``residuals`` by frame.
+    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
+    [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines only moves no
+    surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
+    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a body they are the
+    whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested. ``residuals`` by frame.
     """
 
     name: str

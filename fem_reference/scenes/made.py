@@ -15,8 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
-    """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without
-    a file.
+    """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without a file.
 
     A ``table`` with a ``domain`` is of a scalar field, else of a muscle. Where files have text with a unit, numbers in
     mm, N, MPa, s, rad and tonne do as well. Effects may be those of :func:`fem_reference.make_effect`. ``candidate``,
