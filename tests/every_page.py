@@ -10,11 +10,11 @@ from fem_reference.assessment.cost_study import Study
 from fem_reference.assessment.stress import Bound, Cell, HardCase, History, Scene, Stress
 from fem_reference.report import (
     against_page,
+    asked,
     claims_page,
     effects_page,
     estimation_page,
     field_page,
-    index_page,
     ranking_page,
     stress_page,
     study_page,
@@ -77,7 +77,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
     paths += [report.write(page, folder, name, f"fem-reference {verb}") for name, (verb, page) in pages.items()]
     against = against_page.page(test_versions.pair(comparison), comparison.setup)
     paths.append(report.write(against, folder / "quick-against_old", "against", "fem-reference compare"))
-    index_page.write(folder)
+    asked.write_index(folder)
     return dict(zip(KINDS, [*paths, folder / "index.html"], strict=True))
 
 

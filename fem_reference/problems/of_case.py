@@ -23,7 +23,6 @@ from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
 
-
 # A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
 CaseSetup = Setup | FieldProblem
 CaseProblem = MuscleProblem | FieldProblem

@@ -26,7 +26,6 @@ DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
-
 # Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
 Standard = Literal["reference", "exact", "itself"]
 # Parts of a run that can be measured.

@@ -20,7 +20,6 @@ MOST_FRAMES = 100_000
 LAST_FRAME = 1_000_000_000
 Vector = tuple[float, float, float]
 
-
 Axis = Annotated[Vector, AfterValidator(partial(directed, name="an axis"))]
 
 

@@ -43,7 +43,6 @@ CHEAP = 0.2
 # What is quadratic has as many unknowns on the same cells as what is linear on cells of half the size, and does not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
-
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
