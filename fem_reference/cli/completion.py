@@ -1,4 +1,4 @@
-"""The verb ``completion``: a script that lets a shell complete verbs, options and names, made by shtab of the command line."""
+"""The verb ``completion``: a script that lets a shell complete verbs, options and names, made by shtab from the command line."""
 
 import argparse
 

@@ -3,8 +3,8 @@
 Frame number n is the state after the bones took their pose of frame n. Attached vertices move with their bone exactly. From the
 state before, the method alternates between the rotations of all cells (local step) and the positions of all other vertices (global
 step). Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
-over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still the positive one
-of linear elements. Attachments by springs are exact here, and there is no contact.
+over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still that of
+linear elements, which is positive. Attachments by springs are exact here, and there is no contact.
 """
 
 from collections.abc import Callable

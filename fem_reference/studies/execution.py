@@ -1,4 +1,4 @@
-"""A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
+"""The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
 from collections.abc import Callable, Sequence
