@@ -61,9 +61,7 @@ class StoredStatistic(Record):
 
 
 class Positions(Record):
-    """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
-    ``tolerance`` [mm] of the distance to them.
-    """
+    """Positions ``values`` (f, s, 3) [mm] of sampled ``vertices`` (s,) of ``CurrentMeasures.points``; their ``tolerance`` [mm]."""
 
     tolerance: float = Field(ge=0)
     values: tuple[tuple[tuple[float, float, float] | None, ...], ...]

@@ -120,9 +120,7 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of every statistic of every metric, of changes and of deviations, from the tetrahedra and the variations. A metric
-    of a run itself has no bars: its statistics are exact.
-    """
+    """The bars of changes and deviations, of every statistic of every metric but those of a run itself, which are exact."""
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(as_surface)
 

@@ -32,9 +32,7 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """The surface of a muscle with so many ``vertices`` by so many ``gaussians``: distances of vertices [mm], root mean square and
-    ``greatest``, and its volume over the true one.
-    """
+    """A muscle's surface of ``vertices`` by ``gaussians``: rms and ``greatest`` distance of vertices [mm], volume over the true."""
 
     case: str
     vertices: int

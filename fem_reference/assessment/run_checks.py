@@ -262,9 +262,7 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def _give(problem: MuscleProblem, bone: Bone, pressure: float) -> float:
-    """The allowed penetration [mm] of a bone: the give of contact under the recorded ``pressure`` [MPa], the error of the bone's
-    distance, and the part between contact points.
-    """
+    """The allowed penetration [mm]: give of contact under a ``pressure`` [MPa], error of the distance, part between points."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)

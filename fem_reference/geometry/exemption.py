@@ -126,9 +126,7 @@ class Exemption:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of a surface with contact, outside its ``exempt`` part: at most ``apart`` [mm] from each other on
-    average, carried by the tetrahedra of a ``mesh``.
-    """
+    """The material points with contact, outside the ``exempt`` part, on average ``apart`` [mm] at most, carried by a ``mesh``."""
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

@@ -29,9 +29,7 @@ CaseProblem = MuscleProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on whether a case needs each of its effects, and why, from the set-up that ``rest`` gives, by default a new one;
-    empty for a scalar field, which needs all.
-    """
+    """Decisions on which effects a case needs, and why, from the set-up that ``rest`` gives, or a new one; none of a field."""
     if not isinstance(case, MuscleCase):
         return ()
     known = setup(case) if rest is None else rest()

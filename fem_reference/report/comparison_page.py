@@ -95,9 +95,7 @@ def gap(run: Run) -> float:
 
 
 def headlines(comparison: Comparison) -> Headlines:
-    """The verdict on each candidate, "not judged" where nothing is expected of it, with its greatest deviations; then the
-    reference's own checks and doubts.
-    """
+    """The verdict on each candidate with its greatest deviations; then the reference's own checks and doubts."""
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
