@@ -34,8 +34,8 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
-from fem_reference.report.viewer_fields import Fields, arrows, at_numbers, joints
-from fem_reference.runs.store import Run
+from fem_reference.report.viewer_fields import Fields, arrows, joints
+from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
 # How many bytes the positions and levels of all frames may have before they are compressed: about as many as base64 needs for what

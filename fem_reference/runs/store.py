@@ -12,6 +12,7 @@
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -257,16 +258,17 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
     return run if run.outcome.status in ended else None
 
 
+def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
+    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN where it has no such frame."""
+    rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
+    return np.stack([rows.get(number, lost) for number in numbers])
+
+
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:
     """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
     if run.numbers == numbers:
         return run
-    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
-
-    def pick(values: Floats) -> Floats:
-        blank = np.full(values.shape[1:], np.nan)
-        return np.stack([blank if row is None else values[row] for row in rows])
-
+    pick = partial(at_numbers, run, numbers=numbers)
     return replace(
         run,
         numbers=numbers,
@@ -288,9 +290,7 @@ def seconds_per_frame(run: Run) -> float | None:
     if run.solver == "recorded":
         each = cost.get("seconds_per_frame")  # per frame number
         return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
-    if seconds is None or solved < 1:
-        return None
-    return seconds / solved
+    return None if seconds is None or solved < 1 else seconds / solved
 
 
 def reached(run: Run) -> int:
