@@ -78,17 +78,15 @@ def verb(name: str) -> ModuleType:
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
     """The parser of the whole command line; with ``only`` a verb, that alone is imported: all of them take seconds to load."""
-    whole = argparse.ArgumentParser(
-        prog="fem-reference", description="Finite element reference and validation for muscle deformation."
-    )
+    about = "Finite element reference and validation for muscle deformation."
+    whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
         # What a verb is for is read from its file: to import it takes long.
-        assigned = [
-            node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)
-        ]
-        (text,) = (ast.literal_eval(one.value) for one in assigned if ast.unparse(one.targets[0]) == "HELP")
+        body = ast.parse((_FOLDER / f"{name}.py").read_bytes()).body
+        assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
+        text = ast.literal_eval(assigned["HELP"])
         sub = kinds.add_parser(name, help=text, description=text)
         if only in (None, name):
             _add(verb(name), sub)

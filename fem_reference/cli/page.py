@@ -61,10 +61,8 @@ def _examples(options: argparse.Namespace) -> int:
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
         results = tuple(judging.judged(bench, own_candidates(bench.scene)) for bench in benches)
-    asked = _asked([], options)
-    path, lines = written(
-        asked, field_page.page("The report's Octave examples", results), out(options), options.page_name
-    )
+    page = field_page.page("The report's Octave examples", results)
+    path, lines = written(_asked([], options), page, out(options), options.page_name)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
@@ -78,11 +76,8 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    more = [
-        Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}")
-        for case, found in foreign.items()
-        for one in found
-    ]
+    pairs = [(case, one) for case, found in foreign.items() for one in found]
+    more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
     asked = _asked(scenes.values(), options, more)
     publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED

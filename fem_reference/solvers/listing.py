@@ -48,10 +48,8 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
         values = 0.0 - norms
     if problem.order == 2:  # the listings are linear between vertices
         values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
-    cost = {
-        "seconds_solve": time.perf_counter() - begin,
-        "unknowns": float(len(mesh.points) if components is None else components.size),
-    }
+    unknowns = len(mesh.points) if components is None else components.size
+    cost = {"seconds_solve": time.perf_counter() - begin, "unknowns": float(unknowns)}
     sink(Frame.of_field(problem, values, "as listed", components))
     return Outcome("converged", "as listed", cost)
 

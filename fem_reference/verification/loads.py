@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Turn
 from fem_reference.runs.store import Run
 from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, Specimen, stretch_entry
@@ -51,12 +51,6 @@ def dead(nominal: float) -> Effect:
     return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=ramp())
 
 
-def wet_block(faces: tuple[str, ...]) -> Cells:
-    """A block with a region "wet" of some of its faces."""
-    mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
-    return replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in faces])})
-
-
 def loaded(
     lab: Lab,
     wet: tuple[str, ...],
@@ -65,8 +59,10 @@ def loaded(
     frames: int = 1,
     bulk: float = BULK,
 ) -> Run:
-    """The states of a block under a ``load``, up to so many ``frames``."""
-    body = Body(wet_block(wet), (*neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
+    """The states of a block, with some of its faces ``wet``, under a ``load``, up to so many ``frames``."""
+    mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
+    mesh = replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in wet])})
+    body = Body(mesh, (*neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
     return lab.solve(body, "P2/P1", **STEPS)
 
 

@@ -128,7 +128,8 @@ STANDING = (*clamped("z0"), Prescribed("y0", "y0", (1,), Rest(), stiffness=0.01)
 PULLED = (*SYMMETRY, Prescribed("z1", "z1", (2,), Affine(NO_GRADIENT, (0.0, 0.0, 0.6))))
 
 REMAINS = "Newton's residual of 1e-14 N, at forces of about 1e-3 N, and rounding remain"
-SAME_RULE = f"both integrate by the same Gauss-Legendre rule, so that {REMAINS}"
+ALIKE = "both integrate by the same Gauss-Legendre rule, so that"
+SAME_RULE = f"{ALIKE} {REMAINS}"
 CONSTANT = f"F is constant in a cell, so that every rule is exact: {REMAINS}"
 BAR_RULES = (
     "they integrate by different rules, here of degree 9; by P2/P1 this bar differs by 3e-6 with those of degree 4, 3e-7 with 6, "
@@ -168,14 +169,7 @@ STEEPER = Tolerance(
 )
 BENT = "bent and twisted at once"
 LEANING = "under its weight and a fluid that presses on one side, leaning on springs"
-
-
-BY_GAUSS = Tolerance(
-    1e-9,
-    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains",
-    1e-8,
-    5,
-)
+BY_GAUSS = Tolerance(1e-9, f"{ALIKE} Newton's residual of 1e-8 N, at forces of 50 N, remains", 1e-8, 5)
 
 
 def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
@@ -203,6 +197,7 @@ def specimen(name: str, words: str, block: Specimen) -> Entry:
 
 ACTIVE_BLOCK = Specimen(NEO + fibres.active(0.1), "P2/P1", "pulled", MU, loads=(dead(MU),))
 FAMILIES = Specimen(fibres.FAMILIES, "P2/P1", "equibiaxial", 1.25)
+SHORTENED, SHEARED = Specimen(MOONEY, "Q1/P0", "planar", 0.7), Specimen(HEART, "P2/P1", "simple_shear", 0.3)
 MUSCLE, LOADED = (NEO_HOOKE, PASSIVE, ACTIVE), (NEO_HOOKE, WEIGHT, FLUID)
 TAUT = (NEO_HOOKE, FEBIO, TENSION, PRESTRETCH)
 BENT_P1 = f"A neo-Hookean bar with a penalty on its volume, {BENT}"
@@ -234,12 +229,8 @@ LAGGED = Entry(
 ENTRIES: tuple[Entry, ...] = (
     specimen("uniaxial", "with passive fibres, stretched along them", fibres.muscle(fibres.passive(), 1.6)),
     specimen("equibiaxial", "with two families of fibres, stretched alike along two axes", FAMILIES),
-    specimen(
-        "planar", "of Mooney-Rivlin material, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)
-    ),
-    specimen(
-        "simple_shear", "of Guccione's heart muscle in simple shear", Specimen(HEART, "P2/P1", "simple_shear", 0.3)
-    ),
+    specimen("planar", "of Mooney-Rivlin material, shortened with its width fixed", SHORTENED),
+    specimen("simple_shear", "of Guccione's heart muscle in simple shear", SHEARED),
     specimen("pulled", "with active fibres, pulled by a dead force", ACTIVE_BLOCK),
     specimen("febio", "with FEBio's fibres, stretched along them", fibres.muscle(fibres.passive_febio(), 1.6)),
     specimen("tension", "with fibres of constant tension, fixed short", fibres.muscle(fibres.tension(), 0.9)),

@@ -172,7 +172,6 @@ def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) ->
     """The index of the item with this ``name``; InputError at ``place`` where there is none."""
     names = [one.name for one in named]
     if name not in names:
-        raise InputError(
-            place, f'"{name}"', f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
-        )
+        want = f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
+        raise InputError(place, f'"{name}"', want)
     return names.index(name)

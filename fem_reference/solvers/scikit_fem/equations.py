@@ -149,11 +149,9 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
     """The virtual work of springs that pull towards what is prescribed."""
-    wanted = entry.path(points.places.reshape(-1, 3), frame)
-    pull = [
-        entry.stiffness * (jets[9 + i] - wanted[:, i]) if i in entry.components else constant(0.0, jets[0])
-        for i in range(3)
-    ]
+    wanted, pull = entry.path(points.places.reshape(-1, 3), frame), [constant(0.0, jets[0])] * 3
+    for i in entry.components:
+        pull[i] = entry.stiffness * (jets[9 + i] - wanted[:, i])
     return _along_displacement(pull)
 
 
