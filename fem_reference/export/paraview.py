@@ -22,6 +22,7 @@ from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.io.formats.vtk import DataBlock, Tree, write_blocks
 from fem_reference.metrics import MeasurementContext
+from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
 from fem_reference.runs.contents import frame_file
@@ -75,7 +76,7 @@ class _Frames:
             inside = np.clip(found.barycentric, 0, None)  # a vertex outside of the tetrahedra has what is at their skin
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
-        self.fibres = {run.name: local_fields.fibre_points(run, self.context) for run in comparison.runs}
+        self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
 
     def _of_surface(self, run: Run) -> Iterator[tuple[str, Floats]]:
         """Arrays (f, n) at the vertices of a run, by name."""

@@ -60,6 +60,14 @@ def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:
     return measures("fibre_length", {f"{name}{suffix}": each for name, each in values.items()}, _worst(longer))
 
 
+def fibre_points(run: Run, context: MeasurementContext) -> Floats:
+    """Positions of the points of the fibres, (f, m, 3) [mm]: from the run itself, or carried by its surface."""
+    own = run.fibre_positions
+    if own is not None and own.shape[1:] == context.fibres.points.shape:
+        return own
+    return np.stack([context.extension.apply(points) for points in run.positions])
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
     """The greatest error [mm] over the fibres that the extension makes on the reference's own surface.

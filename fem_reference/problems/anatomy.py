@@ -14,6 +14,7 @@ from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibre_templates import contours, mapped
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
+from fem_reference.geometry.flux_fibres import area_flux, streamlines
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.skins import edge_lengths
@@ -165,14 +166,18 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case as their source has them, in part outside the ``surface``, and their direction at any point: that of
-    the nearest, or of a Laplace field. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
+    the nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
-    field = fibre_field(mesh, *case.fibres.ends.values())
-    if (traced := case.fibres.traced) is not None:
+    traced, ends = case.fibres.traced, case.fibres.ends.values()
+    if traced is not None and traced.flux == "area":
+        flux = area_flux(mesh, *ends)
+        return streamlines(flux, traced.count), flux.field
+    field = fibre_field(mesh, *ends)
+    if traced is not None:
         return trace(field, traced.count), field
     asked = case.fibres.kohout_kukacka
     assert asked is not None  # a Fibres record has one source

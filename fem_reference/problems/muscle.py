@@ -52,6 +52,7 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
+from fem_reference.problems.fibre_ends import attached_ends
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
@@ -168,6 +169,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
     needed = fibre if any("fibre" in effect.needs for effect in asked) else None
     problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
     facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known
+    facts |= ends.facts if (ends := attached_ends(rest.attached, rest.exempt, fibres)) else {}
     return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
 

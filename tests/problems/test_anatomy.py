@@ -1,5 +1,6 @@
 """Attachments and fibres of a case: what a file lists, what lies near, patches of landmarks, and where lines and directions are."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,19 @@ import random_scenes
 import shapes
 from auto_scenes import STILL, pennate
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines, Surface, TetMesh, check_closed, triangle_areas, vertex_areas
+from fem_reference.foundations.mesh import (
+    Polylines,
+    Surface,
+    TetMesh,
+    check_closed,
+    corner_areas,
+    triangle_areas,
+    vertex_areas,
+)
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import edge_lengths
@@ -20,6 +30,7 @@ from fem_reference.io import files
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.anatomy import draped, facets_under, fan, pick
 from fem_reference.problems.estimates import estimates
+from fem_reference.problems.fibre_ends import REACHES, attached_ends, ends_of
 from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, MuscleCase
@@ -280,6 +291,42 @@ def test_lines_that_are_given_are_the_directions(tmp_path) -> None:
     assert np.abs(along @ [np.sin(lean), 0, np.cos(lean)]) == pytest.approx(1, abs=1e-6)
     assert lines.points.min(axis=0).min() >= -1e-9
     assert (lines.points.max(axis=0) <= np.array([10, 10, 40]) + 1e-9).all()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("data")
+@pytest.mark.parametrize("name", ["iliacus_anatomical", "gluteus_medius_anatomical"])
+def test_fibres_by_area_reach_and_cover_the_dissected_attachments(name: str) -> None:
+    """Every end within 2 mm of its attachment, and 90 % of each attachment within the mean spacing, sqrt(A / n), of an end."""
+    case = casefile.read_muscle(name)
+    assert case.fibres.traced is not None
+    assert case.fibres.traced.flux == "area"
+    rest = muscle.setup(case)
+    lines, _ = anatomy.fibres_of(case, rest.surface, partial(muscle.filled, case, rest))
+    ends = attached_ends(rest.attached, rest.exempt, lines)
+    assert ends is not None
+    assert ends.distance.max() < REACHES
+    points = ends_of(lines)
+    for number in range(2):
+        corners = rest.exempt.part[rest.exempt.by == number]
+        areas = corner_areas(corners)
+        away, _ = cKDTree(points[ends.by == number]).query(corners.mean(axis=1))
+        spacing = np.sqrt(areas.sum() / len(lines.lengths()))
+        assert areas[away <= spacing].sum() > 0.9 * areas.sum()
+
+
+def test_fibres_by_area_of_a_case(bar) -> None:
+    """Asked for by their key: a line through each of a few mm2, and the directions of the flow."""
+    case = casefile.read_muscle(bar)
+    assert case.fibres.traced is not None
+    changes = {"start": "bottom", "end": "top", "flux": "area"}
+    traced = case.fibres.traced.model_copy(update=changes)
+    case = case.model_copy(update={"fibres": case.fibres.model_copy(update={"traced": traced})})
+    box = shapes.box((2, 2, 6), (10.0, 10.0, 40.0))
+    lines, direction = anatomy.fibres_of(case, shapes.skin(box), lambda _: box)
+    assert len(lines.lengths()) == traced.count
+    assert lines.lengths() == pytest.approx(40, rel=1e-9)
+    assert direction(np.zeros(1, int), np.array([[3.0, 4, 11]])) == pytest.approx(np.array([[0.0, 0, 1]]), abs=1e-9)
 
 
 def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:

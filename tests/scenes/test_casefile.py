@@ -152,7 +152,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         ),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, vertices, within"),
         ("[[effect]]\n", "effect[0].colour", "mu"),
-        ("[fibres.traced]\n", "fibres.traced.colour", "count, end, start"),
+        ("[fibres.traced]\n", "fibres.traced.colour", "count, end, flux, start"),
         ("[frames]\n", "frames.colour", "every, first, interval, last"),
         ("[[expect]]\n", "expect[0].colour", "because, frame, kind, metric, of, statistic, truth, within"),
         ("[negative_control]\n", "negative_control.colour", "because, key, value"),

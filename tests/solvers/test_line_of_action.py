@@ -299,7 +299,7 @@ def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
     metrics = {
         name: {row["metric"] for row in printed["measures"] if row["candidate"] == name} for name in printed["cost"]
     }
-    assert metrics["line"] == metrics["around"] == {"fibre_length", "moment_arm"}
+    assert metrics["line"] == metrics["around"] == {"fibre_ends", "fibre_length", "moment_arm"}
     assert {"fibre_length", "surface_deviation", "volume", "penetration"} <= metrics["springs"]
     judged = {(row["of"], row["metric"]): row["verdict"] for row in printed["verdicts"]}
     assert judged == {
@@ -323,7 +323,11 @@ def test_a_line_is_shorter_than_its_fibre_at_rest_already(compared) -> None:
     assert -1 < rows["line", "mean"] < -0.01  # fibres of a bulging bar are bent
     assert rows["around", "mean"] > rows["line", "mean"]
     written = list(csv.DictReader((out / "bar" / "measures.csv").read_text().splitlines()))
-    assert {row["metric"] for row in written if row["candidate"] == "line"} == {"fibre_length", "moment_arm"}
+    assert {row["metric"] for row in written if row["candidate"] == "line"} == {
+        "fibre_ends",
+        "fibre_length",
+        "moment_arm",
+    }
     assert all(row["value"] for row in written)
 
 
