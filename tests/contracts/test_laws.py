@@ -144,7 +144,15 @@ def test_the_toe_of_febio_is_integrated_to_twelve_digits(c4: float, linear_from:
 
 @pytest.mark.parametrize(
     "name",
-    ["fibre_passive", "fibre_passive_febio", "fibre_active", "active_tension", "holzapfel_ogden", "guccione", "collagen_across"],
+    [
+        "fibre_passive",
+        "fibre_passive_febio",
+        "fibre_active",
+        "active_tension",
+        "holzapfel_ogden",
+        "guccione",
+        "collagen_across",
+    ],
 )
 def test_fibre_laws_are_blind_to_volume(name: str) -> None:
     effect, F = make(name), uniaxial(1.3)
