@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from fem_reference.assessment.experiments import Fact
 from fem_reference.assessment.judge import judge
 from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
@@ -75,7 +76,8 @@ class Entry:
     to the verb verify.
 
     An entry of the kind "experiment" lays a model beside a muscle: its word is within or outside the uncertainty of the
-    experiment, and neither fails. It fails where the value is not the ``pinned`` one any more.
+    experiment, and neither fails. It fails where the value is not the ``pinned`` one any more. ``facts``: the measured numbers
+    that its truth is made of.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Entry:
     slow: bool = False
     slow_negative_control: bool = False
     pinned: float | None = None
+    facts: tuple[Fact, ...] = ()
 
     def known(self) -> float:
         """The truth, in the unit of the entry."""

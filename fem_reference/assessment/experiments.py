@@ -98,6 +98,11 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
     return found[0]
 
 
+def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
+    """The least and the greatest of what models of muscles differ from muscles by, in a ``quantity``; empty where nobody says."""
+    return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
+
+
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
     """The ratio of two facts, and its standard deviation as if they were independent; NaN where one has none."""
     value = upper.value / lower.value

@@ -103,14 +103,18 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean over the poses of the fibres' mean arm less the published one, of a range its middle [mm]."""
-        return float(np.nanmean(self._off))
+        """The mean of the fibres' mean arm less the published one, of a range its middle, over the poses where that is known [mm];
+        NaN for none.
+        """
+        return float(self._off.mean()) if self._off.size else float("nan")
 
     @property
     def scatter(self) -> float:
-        """The standard deviation of that difference over the poses [mm]."""
-        return float(np.nanstd(self._off))
+        """The standard deviation of that difference over the poses [mm]; NaN for none."""
+        return float(self._off.std()) if self._off.size else float("nan")
 
     @property
     def _off(self) -> Floats:
-        return np.asarray(self.middle - (self.published.low + self.published.high) / 2)
+        centre = (self.published.low + self.published.high) / 2
+        known = np.isfinite(centre)
+        return np.asarray((self.middle - centre)[known])
