@@ -5,32 +5,35 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from fem_reference import report
+from fem_reference.assessment import credibility
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
-from fem_reference.report import claims_page, estimation_page, field_page, ranking_page
+from fem_reference.report import claims_page, credibility_page, estimation_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import estimation, judging, table_5_1, true_errors
+from fem_reference.studies import cube_fits, estimation, judging, moment_arms, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
+from fem_reference.verification import experiments, runner
 
 HELP = "write a page over several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
 EXAMPLES = "octave-examples"
 ESTIMATION = "estimation"
+CREDIBILITY = "credibility"
 OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION])
+    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION, CREDIBILITY])
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
@@ -50,9 +53,10 @@ def run(options: argparse.Namespace) -> int:
     if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
         return _claims(options) if options.name == CLAIMS else _estimation(options)
     if options.case or options.candidate or options.unit:
-        given = "--case, --candidate or --unit" if options.name == EXAMPLES else "--candidate or --unit"
+        without_cases = options.name in (EXAMPLES, CREDIBILITY)
+        given = "--case, --candidate or --unit" if without_cases else "--candidate or --unit"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
-    return _examples(options)
+    return _credibility(options) if options.name == CREDIBILITY else _examples(options)
 
 
 def _examples(options: argparse.Namespace) -> int:
@@ -108,6 +112,20 @@ def _estimation(options: argparse.Namespace) -> int:
     page = estimation_page.page(found)
     asked = _asked(scenes, options, [Part(("--solve",), "solved")] if options.solve else [])
     publish(options, asked, page, estimation_page.facts(found), "\n".join(printed))
+    return DONE
+
+
+def _credibility(options: argparse.Namespace) -> int:
+    """The evidence for each quantity; moment arms where the anatomy is there."""
+    with fenicsx.shared():
+        arms, missing = moment_arms.beside(out(options) / "runs")
+    entries, results = runner.entries().values(), experiments.results()
+    rows = tuple(credibility.row(claim, entries, results, arms) for claim in credibility.claims())
+    fits = (cube_fits.shipped_law(), cube_fits.collagen_law())
+    found = credibility.Credibility(rows, arms, missing, fits)
+    printed = [credibility_page.said(found), *(f"left out: {case}: {why}" for case, why in missing.items())]
+    page = credibility_page.page(found)
+    publish(options, _asked([], options), page, credibility_page.facts(found), "\n".join(printed))
     return DONE
 
 

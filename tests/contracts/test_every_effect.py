@@ -103,11 +103,12 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPRESSED)
 def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
-    effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
+    effect, near = make(name), np.eye(3) + 0.05 * deformations()[0]
+    both = [uniaxial(stretch) @ near for stretch in (1.6, 0.7)]  # fibres pull in one, what is across them in the other
     for key, _, unit in effect.parameters:
         changed = make(name, **{key: other(type(effect), key, PARAMETERS[name][key])})
         printed = [
-            (np.array(outcome(one, state(F, fibre=ALONG))).tolist(), one.title, one.amount(5))
+            ([np.array(outcome(one, state(F, fibre=ALONG))).tolist() for F in both], one.title, one.amount(5))
             for one in (effect, changed)
         ]
         assert printed[0] != printed[1], key
