@@ -117,7 +117,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
         empty = _empty(name, stated.curve or stated.label, stated.unit, nominal.values, comparison, nominal.error_bars)
         values = [one.values for found in measured if (one := find(found, metric, statistic)) is not None]
         yield bands.of_values(empty, design, np.array(values).reshape(len(values), len(nominal.values)))
-    for bone in comparison.scene.bone if isinstance(comparison.scene, MuscleCase) else ():
+    for bone in context.bones:
         if bone.motion is not None and f"force_on_{bone.name}_x" in comparison.reference.scalars:
             title, own = (
                 f"Force of the muscle on {bone.name}",
