@@ -44,7 +44,7 @@ class Design:
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
     """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable once in each of so many equal parts of its range."""
-    return 2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1
+    return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 
 
 def of_values(band: Band, design: Design, values: Floats) -> Band:

@@ -13,6 +13,7 @@ from math import comb
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 
@@ -48,7 +49,7 @@ class Chaos:
         """The share (d,) of the variance by each variable alone and with others."""
         return self._share(self.powers > 0)
 
-    def _share(self, counted: Floats) -> Floats:
+    def _share(self, counted: NDArray[np.bool_]) -> Floats:
         """The shares (d,) of the variance in the terms that are ``counted`` (k, d)."""
         variances = (self.coefficients**2).sum(axis=1)
         return np.asarray(variances @ counted / variances[1:].sum())

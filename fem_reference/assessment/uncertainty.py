@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.io.texts import plain
 
 FORMAT = 1
-Place = Literal["inside", "undecided", "outside"]
+Place = Literal["inside", "undecided", "outside", ""]
 # Of the width of a band: rounding at its ends.
 _ROUNDING = 1e-6
 
@@ -39,10 +39,20 @@ class Parameter:
         >>> Parameter("k", "k", "", 1.0, 1.0, 100.0, "log-uniform", "").value(0.0)
         10.0
         """
-        share = (place + 1) / 2
+        return float(f"{self.at((place + 1) / 2):.6g}")
+
+    def at(self, share: float) -> float:
+        """The value at a ``share`` from 0 to 1 of the range, and beyond it; :meth:`place` is its inverse."""
         if self.spread == "log-uniform":
-            return float(f"{math.exp(math.log(self.low) + share * math.log(self.high / self.low)):.6g}")
-        return float(f"{self.low + share * (self.high - self.low):.6g}")
+            with np.errstate(over="ignore"):
+                return float(np.exp(math.log(self.low) + share * math.log(self.high / self.low)))
+        return float(self.low + share * (self.high - self.low))
+
+    def place(self, value: float) -> float:
+        """The share of the range below a ``value``."""
+        if self.spread == "log-uniform":
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,7 @@ class Placed:
     candidate: str
     quantity: str
     values: Floats
-    places: tuple[Place | Literal[""], ...]
+    places: tuple[Place, ...]
     beyond: Floats
 
     @property
@@ -157,7 +167,9 @@ def place(candidate: str, band: Band, values: Floats) -> Placed:
     margin = np.where(np.isnan(values), -np.inf, np.minimum(above, below))
     margin = margin + _ROUNDING * np.nan_to_num(band.high - band.low) + _ROUNDING**2
     defined = np.isfinite(band.high)
-    places = tuple(_place(*one) if known else "" for *one, known in zip(margin, bar, defined, strict=True))
+    places = tuple(
+        _place(float(far), float(here)) if known else "" for far, here, known in zip(margin, bar, defined, strict=True)
+    )
     return Placed(candidate, band.quantity, values, places, np.maximum(-margin, 0.0))
 
 

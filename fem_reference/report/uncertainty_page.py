@@ -130,7 +130,7 @@ def shares(found: Uncertainty, band: Band) -> Drawing:
         axes.set_yticks(places, [titles[key] for key in keys])
         axes.set(xlabel="% of the variance over all frames", xlim=(0, 105))
         axes.grid(visible=False, axis="y")
-        axes.figure.legend(loc="outside upper left", ncols=2)  # type: ignore[union-attr]
+        axes.figure.legend(loc="outside upper left", ncols=2)
 
     return drawn(f"shares-{band.quantity}", title, (5.4, 1.1 + 0.34 * len(keys)), draw)
 

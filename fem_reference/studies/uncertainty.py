@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -103,62 +104,49 @@ def _failure(one: Made, parameters: Sequence[Parameter]) -> Failure:
 
 def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iterator[Band]:
     """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have answers."""
+    whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
     assert isinstance(context, MeasurementContext)  # of a muscle
-    whole = [complete(run, comparison.scene.numbers) for run in runs]
-    yield _surface(comparison, design, whole)
+    yield _surface(comparison, context, design, whole)
     measured = [change(run, context, {name.split(".")[0] for name in QUANTITIES}) for run in whole]
     for name in QUANTITIES:
         metric, statistic = name.split(".")
         nominal = find(comparison.changes["reference"], metric, statistic)
-        if nominal is None or not np.isfinite(nominal.values).any():
-            continue
-        stated = described()[metric, statistic]
-        empty = _empty(name, stated.curve or stated.label, stated.unit, nominal.values, comparison, nominal.error_bars)
-        values = [one.values for found in measured if (one := find(found, metric, statistic)) is not None]
-        yield bands.of_values(empty, design, np.array(values).reshape(len(values), len(nominal.values)))
+        if nominal is not None and np.isfinite(nominal.values).any():
+            stated = described()[metric, statistic]
+            empty = _empty(comparison, name, stated.curve or stated.label, stated.unit, nominal.values)
+            found = [one.values for each in measured if (one := find(each, metric, statistic)) is not None]
+            yield bands.of_values(replace(empty, bar=nominal.error_bars), design, _rows(found, nominal.values))
     for bone in context.bones:
         if bone.motion is not None and f"force_on_{bone.name}_x" in comparison.reference.scalars:
-            title, own = (
-                f"Force of the muscle on {bone.name}",
-                np.linalg.norm(comparison.reference.force(bone.name), axis=1),
-            )
-            empty = _empty(f"{FORCE}{bone.name}", title, "N", own, comparison, None)
-            forces = [np.linalg.norm(run.force(bone.name), axis=1) for run in whole]
-            yield bands.of_values(empty, design, np.array(forces).reshape(len(forces), len(own)))
+            own, *forces = (np.linalg.norm(run.force(bone.name), axis=1) for run in (comparison.reference, *whole))
+            empty = _empty(comparison, f"{FORCE}{bone.name}", f"Force of the muscle on {bone.name}", "N", own)
+            yield bands.of_values(empty, design, _rows(forces, own))
 
 
-def _surface(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Band:
+def _rows(found: Sequence[Floats], like: Floats) -> Floats:
+    """The values (n, f) of runs, of which there may be none."""
+    return np.array(found).reshape(len(found), len(like))
+
+
+def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
     """The band of the distance of the surface from the case's own, root mean square over its area."""
-    reference, context = comparison.reference, comparison.context
-    assert isinstance(context, MeasurementContext)
-    stated, frames = described()[SURFACE], len(reference.numbers)
-    bar = comparison.error_bars and comparison.error_bars.find("deviation", *SURFACE)
-    title = "Distance of the surface from that of the case, rms"
-    empty = _empty(
-        ".".join(SURFACE), title, stated.unit, np.zeros(frames), comparison, bar and bar.values, distance=True
-    )
+    reference, bars = comparison.reference, comparison.error_bars
+    title, frames = "Distance of the surface from that of the case, rms", len(reference.numbers)
+    empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))
+    bar = None if bars is None else bars.find("deviation", *SURFACE)
     weights = np.sqrt(context.areas / context.areas.sum())[:, None]
     products = np.zeros((frames, len(runs), len(runs)))
-    for i in range(frames):
+    for i in range(frames if runs else 0):
         moved = np.array([((run.positions[i] - reference.positions[i]) * weights).ravel() for run in runs])
-        products[i] = moved @ moved.T if len(runs) else 0.0
-    return bands.of_field(empty, design, products)
+        products[i] = moved @ moved.T
+    return bands.of_field(replace(empty, bar=None if bar is None else bar.values, distance=True), design, products)
 
 
-def _empty(
-    quantity: str,
-    title: str,
-    unit: str,
-    nominal: Floats,
-    comparison: Comparison,
-    bar: Floats | None,
-    *,
-    distance: bool = False,
-) -> Band:
+def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal: Floats) -> Band:
+    """A band of nothing yet, around the answer of the case."""
     unknown = np.full(len(nominal), np.nan)
-    numbers = comparison.reference.numbers
-    return Band(quantity, title, unit, numbers, nominal, unknown, unknown, unknown, bar, distance)
+    return Band(quantity, title, unit, comparison.reference.numbers, nominal, unknown, unknown, unknown)
 
 
 def _beside(comparison: Comparison, found: Sequence[Band]) -> Iterator[tuple[Run, Band, Floats]]:
