@@ -57,6 +57,10 @@ _SHARED: dict[str, dict[str, Any]] = {
         "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
     },
     "--workers": {"type": int, "default": 1, "metavar": "N", "help": "how many runs are made at once (default: 1)"},
+    "--scheduler": {
+        "metavar": "ADDRESS",
+        "help": "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too",
+    },
 }
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.effects import Effect
+from fem_reference.foundations.limits import Range
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
@@ -227,6 +228,12 @@ class Frames(Record):
         return tuple(range(self.first, self.last + 1, self.every))
 
 
+class Uncertain(Range):
+    """The range of a number of the case, by its ``key`` such as ``effect[0].mu``, in place of the one that its effect states."""
+
+    key: str
+
+
 class MuscleCase(Case):
     """The case of a muscle. Its key ``effects`` (``choice``) says whether all effects that are listed act, or those of
     them that the case needs: "auto".
@@ -239,6 +246,7 @@ class MuscleCase(Case):
     attachment: tuple[Attachment, ...] = ()
     fibres: Fibres
     frames: Frames
+    uncertain: tuple[Uncertain, ...] = ()
 
     task = "solve"
     carries = frozenset({"surface", "lines"})

@@ -29,7 +29,7 @@ MUSCLE_KEYS = [
     "negative_control",
     "proves",
 ]
-MUSCLE_KEYS += ["quick", "reference", "title", "unsolved"]
+MUSCLE_KEYS += ["quick", "reference", "title", "uncertain", "unsolved"]
 # Solvers check their own settings.
 OPTIONAL = ("interval", "newton_iterations", "stretch", "statistic", 'frame = "any"')
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))

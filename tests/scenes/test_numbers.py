@@ -1,0 +1,58 @@
+"""Numbers of a case by key: the ones of the file, changed like by the file, and refused where they are none."""
+
+from pathlib import Path
+
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.scenes import casefile, numbers
+
+
+def test_numbers_and_units_are_those_of_the_file(bar: Path) -> None:
+    case = casefile.read(bar)
+    for key, value, unit, title in (
+        ("effect[0].mu", 0.03, "MPa", "neo_hooke mu"),
+        ("muscle.tet_size", 20.0, "mm", "muscle tet_size"),
+        ("attachment[0].within", 2.0, "mm", "attachment start within"),
+        ("frames.last", 20.0, "", "frames last"),
+        ("bone[1].motion.keyframes[1].frame", 10.0, "", "bone lever motion keyframes 2 frame"),
+    ):
+        assert numbers.number(case, key) == pytest.approx(value)
+        assert (numbers.unit(case, key), numbers.title(case, key)) == (unit, title)
+
+
+def test_a_changed_case_is_that_of_a_changed_file(bar: Path) -> None:
+    case = casefile.read(bar)
+    changed = numbers.changed(case, {"effect[0].mu": 0.02, "attachment[0].within": 3.0})
+    assert changed == casefile.read(bar, changes={"effect[0].mu": "20 kPa", "attachment[0].within": "3 mm"})
+    assert changed.key != case.key
+    assert numbers.changed(changed, {"effect[0].mu": 0.03, "attachment[0].within": 2.0}).key == case.key
+    assert numbers.read(case, "effect[0].mu", "20 kPa") == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("effect[7].mu", "nothing"),
+        ("effect[0].nu", "nothing"),
+        ("effect[0]", "NeoHooke"),
+        ("effect.mu", "nothing"),
+        ("title", "str"),
+        ("attachment[0].stiffness", "no value"),
+        ("", "nothing"),
+        ("bone[1].motion.axis[0]", "a number of a list"),
+    ],
+)
+def test_a_key_of_no_number_is_refused(bar: Path, key: str, message: str) -> None:
+    with pytest.raises(InputError, match=f"got {message}, want the key of a number"):
+        numbers.read(casefile.read(bar), key, 1.0)
+
+
+def test_a_value_is_checked_as_in_a_file(bar: Path) -> None:
+    case = casefile.read(bar)
+    with pytest.raises(InputError, match=r'effect\[0\]\.mu: got "1 mm", want a pressure'):
+        numbers.read(case, "effect[0].mu", "1 mm")
+    with pytest.raises(InputError, match=r"effect\[0\]\.mu: got -0.01, want more than zero"):
+        numbers.changed(case, {"effect[0].mu": -0.01})
+    with pytest.raises(InputError, match=r"effect\[0\]\.mu: got nan"):
+        numbers.changed(case, {"effect[0].mu": float("nan")})
