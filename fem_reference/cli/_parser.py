@@ -111,13 +111,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 class _Given(argparse.Action):
     """The value of an option, given once: a second one would silently replace it. A list has each of its values once."""
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         """Take it."""
         del parser
         if option_string and isinstance(self.default, list):

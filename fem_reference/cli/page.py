@@ -88,7 +88,6 @@ def _table(options: argparse.Namespace) -> int:
 
 
 def _claims(options: argparse.Namespace) -> int:
-    """Error bars beside errors."""
     scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
     found = true_errors.stake(scenes, out(options) / "runs")
     whole = Cover.of(found.claims)
@@ -101,7 +100,6 @@ def _claims(options: argparse.Namespace) -> int:
 
 
 def _estimation(options: argparse.Namespace) -> int:
-    """The report's estimation techniques."""
     scenes = [casefile.read_muscle(case) for case in options.case or estimation.CASES]
     with fenicsx.shared():
         found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
@@ -130,7 +128,6 @@ def _credibility(options: argparse.Namespace) -> int:
 
 
 def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:
-    """The page over the cases that were asked for."""
     cases = [Part(("--case", case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
     return Asked("page", options.name, (Part((options.name,)), *cases, *more))
 

@@ -15,10 +15,9 @@ from fem_reference.scenes.muscle import MuscleCase
 
 def check(folder: Path) -> None:
     """Raise InputError unless ``folder`` is missing or empty."""
-    if folder.is_file():
-        raise InputError("--to", f'"{folder}", a file', "a folder that is not there yet, or empty")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError("--to", f'"{folder}", which is not empty', "a folder that is not there yet, or empty")
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        got = f'"{folder}", {"a file" if folder.is_file() else "which is not empty"}'
+        raise InputError("--to", got, "a folder that is not there yet, or empty")
 
 
 @contextmanager

@@ -126,20 +126,16 @@ class MassSpringModel:
         self.points = problem.begin(mesh.points)
         self.previous = self.points.copy()
         self.check = SurfaceCheck(Surface(mesh.points, skin), self.fixed)
-        longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(self.network, self.fixed)
+        stable = stable_time_step(self.network, self.fixed)
+        longest = settings.time_step or SHARE_OF_STABLE * stable
         self.wanted = settings.frame_time / longest
         self.steps = max(1, math.ceil(self.wanted - 1e-9))
         self.time_step = settings.frame_time / self.steps
+        self.advice = "a longer frame_time or more damping may help"
+        if self.time_step > stable:
+            self.advice = f"the time step of {self.time_step:.3g} s is above the stable one of {stable:.3g} s"
         free = len(self.points) - len(self.fixed)
         self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
-
-    @property
-    def advice(self) -> str:
-        """Advice: a stable time step, else settings that bring the masses to rest."""
-        limit = stable_time_step(self.network, self.fixed)
-        if self.time_step > limit:
-            return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
-        return "a longer frame_time or more damping may help"
 
     def move(self, number: int) -> None:
         """Take the steps from the frame number before to ``number``."""

@@ -119,7 +119,9 @@ class RbfMuscle(MovingSurface):
         self.cloud = Cloud.of(self.fitted.centres, rest.points[np.concatenate(self.handles)])
         away, nearest = cKDTree(rest.points[vertices]).query(rest.points)
         self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
-        self.along = _along(setup, self.cloud.nodes)
+        first, last = (rest.points[setup.attached[i].vertices].mean(axis=0) for i in (0, -1))
+        direction = (last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny)
+        self.along = np.broadcast_to(direction, self.cloud.nodes.shape)  # from the first attachment to the last
         self.volume = enclosed_volume(rest.points, rest.triangles)
         self.nodes = self.cloud.nodes
         self.cost["unknowns"] = 4.0 * settings.gaussians
@@ -177,13 +179,6 @@ class RbfMuscle(MovingSurface):
     def ending(self) -> Outcome:
         """Converged, as every state is found by formulas."""
         return Outcome("converged", f"{self.settings.gaussians} Gaussians, {4 * self.settings.gaussians} parameters")
-
-
-def _along(setup: Setup, nodes: Floats) -> Floats:
-    """Unit vectors (k, 3) at ``nodes`` (k, 3) from the middle of the first attachment to that of the others."""
-    first = setup.surface.points[setup.attached[0].vertices].mean(axis=0)
-    last = setup.surface.points[setup.attached[-1].vertices].mean(axis=0)
-    return np.broadcast_to((last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny), nodes.shape)
 
 
 def solve(setup: Setup, settings: RbfSettings, sink: Sink) -> Outcome:

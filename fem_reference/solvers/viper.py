@@ -147,7 +147,6 @@ class Rods(MovingSurface):
         return points, turns
 
     def _sweep(self) -> None:
-        """Project all constraints once."""
         chosen = self.settings
         kernels.project_stretch(self.rods, self.turns, self.steps, chosen.stretch)
         kernels.project_bend(self.turns, chosen.bending)

@@ -80,13 +80,11 @@ class AssembledBody:
         self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock)
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
-        """The condition of ``entry`` on this rank's unknowns."""
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
         return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
 
     def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
-        """The contact of bones with this rank's points."""
         if isinstance(law.on, str):
             points = contact_points.on_facets(self.displacement, body.mesh, form.regions[law.on], form.degree)
         else:

@@ -6,6 +6,8 @@ Pressure block: the mass matrix over local stiffness, which is spectrally equiva
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem.petsc import interpolation_matrix
@@ -61,13 +63,14 @@ class Multigrid:
         the remaining forces.
         """
         with self.spent.on("factorisation"):
+            kinds: Any = PETSc.PC  # its stubs call their members numbers
             blocks = PETSc.PC().create(self.matrix.comm)
             blocks.setOperators(self.matrix, self.matrix)
             blocks.setType("fieldsplit")
             blocks.setFieldSplitIS(("displacement", self.sets[0]), ("pressure", self.sets[1]))
-            blocks.setFieldSplitType(PETSc.PC.CompositeType.SCHUR)
-            blocks.setFieldSplitSchurFactType(PETSc.PC.FieldSplitSchurFactType.UPPER)
-            blocks.setFieldSplitSchurPreType(PETSc.PC.FieldSplitSchurPreType.USER, self._schur())
+            blocks.setFieldSplitType(kinds.CompositeType.SCHUR)
+            blocks.setFieldSplitSchurFactType(kinds.FieldSplitSchurFactType.UPPER)
+            blocks.setFieldSplitSchurPreType(kinds.FieldSplitSchurPreType.USER, self._schur())
             blocks.setUp()
             blocks.setReusePreconditioner(True)  # until it is stale
             moves, pressures = blocks.getFieldSplitSchurGetSubKSP()

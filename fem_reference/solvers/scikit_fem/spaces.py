@@ -15,7 +15,6 @@ from skfem.quadrature import get_quadrature
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.fibres import Directions
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 
 VARIABLES = 13
@@ -51,11 +50,6 @@ class Points:
     def part(self, chosen: slice) -> "Points":
         """The points of some of the cells."""
         return replace(self, **{name: entry[chosen] for name, entry in vars(self).items() if entry is not None})
-
-    def with_fibre(self, fibre: Directions) -> "Points":
-        """The same points in a body with fibres."""
-        cells = np.repeat(self.cells, self.places.shape[1])
-        return replace(self, fibre=fibre(cells, self.places.reshape(-1, 3)).reshape(self.places.shape))
 
     @property
     def rates(self) -> Floats:
