@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` on the fibres of a case, of each of which ``known`` points were given: distances [mm] of the others from the
-    curve, root mean square and ``greatest``.
-    """
+    """A ``technique`` given ``known`` points of each fibre: distances [mm] of the others from its curve, rms and ``greatest``."""
 
     case: str
     technique: str

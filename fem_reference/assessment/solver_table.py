@@ -83,9 +83,7 @@ class SolverResult:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene of the table: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement ``travel`` [mm],
-    and the outcome of the reference.
-    """
+    """A scene: ``title``, ``triangles`` of the muscle, greatest displacement ``travel`` [mm] and outcome of the reference."""
 
     case: str
     title: str

@@ -181,8 +181,9 @@ def nodes(mesh: FieldMesh, order: int) -> Ints:
 
 
 def functions(barycentric: Floats, order: int) -> Floats:
-    """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`: ``L_i``, or ``L_i (2
-    L_i - 1)`` at corners and ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite Element Method, vol. 1, 8.8).
+    """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`.
+
+    Order 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor, The Finite Element Method, 8.8).
     """
     if order == 1:
         return barycentric

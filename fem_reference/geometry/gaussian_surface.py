@@ -35,9 +35,7 @@ class GaussianSurface:
     radii: Floats
 
     def level(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """The logarithm of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; and the share (n, m)
-        of each Gaussian in the sum.
-        """
+        """Log of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; shares (n, m) of the Gaussians."""
         exponents = -cdist(points, self.centres, "sqeuclidean") / self.radii**2
         level = logsumexp(exponents, axis=1)
         shares = np.exp(exponents - level[:, None])

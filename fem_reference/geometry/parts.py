@@ -49,9 +49,7 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """The parts with well-shaped triangles of about ``size`` [mm], on the ``fine`` surface: short edges at rims collapsed, edges
-    flipped, points slid, those of a rim along it only.
-    """
+    """The parts with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; points of a rim stay on the rim."""
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
         triangles = flip_edges(parts.points, parts.triangles, parts.labels)

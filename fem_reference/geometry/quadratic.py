@@ -82,9 +82,7 @@ class Displaced:
 
 
 def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Floats, Floats]:
-    """The basis functions (q, n) at the points of a rule that is exact to degree 4, their slopes (d, q, n) along the sides of the
-    reference cell, and its weights (q,).
-    """
+    """Basis functions (q, n) and their slopes (d, q, n) at the points of a rule that is exact to degree 4, and its weights (q,)."""
     points, weights = get_quadrature(element, 4)
     nodes = range(6) if element.dim == 2 else (0, 1, 2, 3, 4, 6, 5, 7, 8, 9)  # scikit-fem has edge 12 before edge 02
     values, slopes = zip(*(element.lbasis(points, i) for i in nodes), strict=True)

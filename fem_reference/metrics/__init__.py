@@ -242,9 +242,7 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from the ``values`` (f,) by statistic; all are worst at the places ``where`` (f,), in
-    words, or at no particular place.
-    """
+    """The measures of the metric ``name`` from ``values`` (f,) by statistic, all worst at the places ``where`` (f,), if any."""
     stated = metric(name).STATISTICS
     return tuple(
         Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()

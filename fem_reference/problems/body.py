@@ -130,9 +130,7 @@ class Prescribed:
     stiffness: float | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """Displacements (n, 3) [mm] that the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the
-        others; InputError where the path gives none.
-        """
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it has none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))

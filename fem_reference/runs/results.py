@@ -62,10 +62,10 @@ class Results:
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
         """Results by name at ``points`` (n, 3) [mm] of the rest state, at a frame number of ``frames``.
 
-        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3), ``F[i,
-        k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume grows;
-        ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and ``fibre_stress``
-        (n,) [MPa], the stress along the present fibre direction. InputError where the run has no such frame or result.
+        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
+        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume
+        grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and
+        ``fibre_stress`` (n,) [MPa] along the present fibre. InputError where the run lacks such a frame or result.
 
         A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: at a shared point
         they are those of one tetrahedron. Where det F is not positive the stress is NaN.

@@ -89,9 +89,7 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
 
 
 def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
-    """The distances (k,) [mm] of points of a ``line`` (n, 3) from the curve that ``make`` makes of its ends and others, ``count``
-    in all, spread evenly.
-    """
+    """Distances (k,) [mm] of a ``line`` (n, 3) from the curve that ``make`` makes of ``count`` of its points, spread evenly."""
     known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
     away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
