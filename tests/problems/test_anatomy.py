@@ -295,14 +295,8 @@ def test_lines_that_are_given_are_the_directions(tmp_path) -> None:
     assert (lines.points.max(axis=0) <= np.array([10, 10, 40]) + 1e-9).all()
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("data")
-@pytest.mark.parametrize("name", ["iliacus_anatomical", "gluteus_medius_anatomical"])
-def test_fibres_by_area_reach_and_cover_the_dissected_attachments(name: str) -> None:
+def check_coverage(case: MuscleCase) -> None:
     """Every end within 2 mm of its attachment, and 90 % of each attachment within the mean spacing, sqrt(A / n), of an end."""
-    case = casefile.read_muscle(name)
-    assert case.fibres.traced is not None
-    assert case.fibres.traced.flux == "area"
     rest = muscle.setup(case)
     lines, _ = anatomy.fibres_of(case, rest.surface, partial(muscle.filled, case, rest))
     ends = attached_ends(rest.attached, rest.exempt, lines)
@@ -315,6 +309,25 @@ def test_fibres_by_area_reach_and_cover_the_dissected_attachments(name: str) -> 
         away, _ = cKDTree(points[ends.by == number]).query(corners.mean(axis=1))
         spacing = np.sqrt(areas.sum() / len(lines.lengths()))
         assert areas[away <= spacing].sum() > 0.9 * areas.sum()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("data")
+@pytest.mark.parametrize("name", ["iliacus_anatomical", "gluteus_medius_anatomical"])
+def test_fibres_by_area_reach_and_cover_the_dissected_attachments(name: str) -> None:
+    case = casefile.read_muscle(name)
+    assert case.fibres.traced is not None
+    assert case.fibres.traced.flux == "area"
+    check_coverage(case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flux", ["area", None])
+def test_fibres_of_a_spindle_cover_its_ends_either_way(flux: str | None) -> None:
+    case = casefile.read_muscle("hip_flexion")
+    assert case.fibres.traced is not None
+    traced = case.fibres.traced.model_copy(update={"flux": flux})
+    check_coverage(case.model_copy(update={"fibres": case.fibres.model_copy(update={"traced": traced})}))
 
 
 REACHING = (
