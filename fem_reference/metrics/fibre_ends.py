@@ -26,7 +26,7 @@ OF, AGAINST = "lines", "itself"
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the place of an end less that to which the
-    pose of its bone takes its rest position. Nothing where the muscle is not attached.
+    pose of its bone takes its rest position; 0 where a tendon goes on to the bone. Nothing where the muscle is not attached.
     """
     if context.ends is None:
         return ()
@@ -34,7 +34,7 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     rest = ends_of(context.fibres if own is None or own.points.shape != context.fibres.points.shape else own)
     off = np.array(
         [
-            np.linalg.norm(ends_of(context.fibres, at) - context.ends.taken(rest, number), axis=2)
+            context.ends.off(ends_of(context.fibres, at), rest, number)
             for number, at in zip(run.numbers, points, strict=True)
         ]
     ).reshape(len(run.numbers), -1)

@@ -49,6 +49,19 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
 
 
+def tendon_of(case: MuscleCase, i: int) -> Floats | None:
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None where it has none."""
+    if (tendon := case.attachment[i].tendon) is None:
+        return None
+    key = f"attachment[{i}].tendon"
+    path = case.file(tendon.file, f"{key}.file")
+    clouds = _clouds(path, tendon.unit)
+    if tendon.cloud not in clouds:
+        want = f"one of {', '.join(sorted(clouds))}"
+        raise InputError(join(case.place, f"{key}.cloud"), f'"{tendon.cloud}", which {path} does not have', want)
+    return np.array(clouds[tendon.cloud]).mean(axis=0)
+
+
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
     """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part,
     although they do not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares``

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.distance import distances
+from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
@@ -15,16 +16,32 @@ from fem_reference.problems.setup import AttachedVertices
 REACHES = 2.0
 SIDES = ("first", "last")  # ends of a fibre
 
+Bools = NDArray[np.bool_]
+
 
 @dataclass(frozen=True, eq=False)
 class FibreEnds:
-    """The first and the last end of k fibres: ``by`` (k, 2), the index of the attachment in ``attached`` that each belongs to, and
-    its ``distance`` (k, 2) [mm] from the attached area at rest.
+    """The first and the last end of k fibres: ``by`` (k, 2), the index of the attachment in ``attached`` that each belongs to, its
+    ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that.
+
+    An end that does not reach its attachment goes on by the tendon of that, where it has one.
     """
 
     attached: tuple[AttachedVertices, ...]
     by: Ints
     distance: Floats
+    closest: Floats
+
+    @cached_property
+    def tendons(self) -> Floats:
+        """The points (k, 2, 3) [mm] of bones at rest to which ends go on; NaN where they do not."""
+        points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
+        return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
+
+    @property
+    def beside(self) -> Bools:
+        """Mask (k, 2) of the ends that neither reach their attachment nor go on by a tendon."""
+        return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
 
     def taken(self, rest: Floats, frame: float) -> Floats:
         """The places (k, 2, 3) [mm] to which the bones take the ends from ``rest`` (k, 2, 3) [mm], by a ``frame``."""
@@ -33,22 +50,32 @@ class FibreEnds:
             found[self.by == i] = apply(one.bone.pose(frame), rest[self.by == i])
         return found
 
+    def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
+        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from where bones take them from ``rest`` (k, 2, 3); 0
+        with a tendon, which ends at its bone.
+        """
+        away = np.linalg.norm(ends - self.taken(rest, frame), axis=2)
+        return np.where(np.isnan(self.tendons[:, :, 0]) | np.isnan(away), away, 0.0)
+
+    def beyond(self, ends: Floats, frame: float) -> Floats:
+        """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 without."""
+        lengths = np.linalg.norm(self.taken(self.tendons, frame) - ends, axis=2)
+        return np.asarray(np.where(np.isnan(self.tendons[:, :, 0]), 0.0, lengths).sum(axis=1))
+
     def named(self, fibre: int, side: int) -> str:
         """An end in words."""
         return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}"
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The number of ends, and of those that do not reach their attachment the number, the worst, and all by name."""
-        beyond = np.argwhere(self.distance > REACHES)
-        found: dict[str, float | str] = {
-            "fibre_ends": float(self.by.size),
-            "fibre_ends_beyond_2_mm": float(len(beyond)),
-        }
-        if len(beyond):
-            worst = np.unravel_index(np.argmax(self.distance), self.by.shape)
-            found["fibre_end_farthest_mm"] = float(self.distance[worst])
-            names = (f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in beyond.tolist())
+        """The number of ends, of those that go on by a tendon, and of those beside their attachment; of these all by name."""
+        found: dict[str, float | str] = {"fibre_ends": float(self.by.size)}
+        found["fibre_ends_beyond_2_mm"] = float(self.beside.sum())
+        if np.isfinite(self.tendons).any():
+            found["fibre_ends_by_tendon"] = float(np.isfinite(self.tendons[:, :, 0]).sum())
+        if self.beside.any():
+            found["fibre_end_farthest_mm"] = float(self.distance[self.beside].max())
+            names = (f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in np.argwhere(self.beside).tolist())
             found["fibre_ends_not_attached"] = "; ".join(names)
         return found
 
@@ -69,18 +96,39 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
     if not attached:
         return None
     ends = ends_of(fibres)
-    away = np.stack([_distances(exempt, i, ends) for i in range(len(attached))], axis=2)  # (k, 2, a)
+    nearest = [_nearest(exempt, i, ends) for i in range(len(attached))]
+    away = np.stack([one.distance for one in nearest], axis=1).reshape(len(ends), 2, -1)
+    closest = np.stack([one.closest for one in nearest], axis=1).reshape(len(ends), 2, -1, 3)
     bones = np.array([one.bone.name for one in attached])
     sums = away[:, 0, :, None] + away[:, 1, None, :]
     if len(np.unique(bones)) > 1:
         sums = np.where(bones[:, None] == bones, np.inf, sums)
     pairs = np.argmin(sums.reshape(len(ends), -1), axis=1)
     by = np.stack(np.divmod(pairs, len(bones)), axis=1)
-    return FibreEnds(attached, by, np.take_along_axis(away, by[:, :, None], axis=2)[:, :, 0])
+    fibre, side = np.indices(by.shape)
+    return FibreEnds(attached, by, away[fibre, side, by], closest[fibre, side, by])
 
 
-def _distances(exempt: Exemption, i: int, ends: Floats) -> Floats:
-    """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) from the area of attachment ``i``."""
+def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
+    """The ``lines``, those that end beside their attachment with the straight piece to its closest point, in steps of 2 mm or less.
+
+    Where a piece leaves the muscle its points are to be moved back into it.
+    """
+    parts = []
+    for i, (first, last) in enumerate(ends.beside):
+        line = lines.points[lines.offsets[i] : lines.offsets[i + 1]]
+        before = _steps(line[0], ends.closest[i, 0])[::-1] if first else line[:0]
+        after = _steps(line[-1], ends.closest[i, 1]) if last else line[:0]
+        parts.append(np.concatenate([before, line, after]))
+    return Polylines(np.concatenate(parts), np.cumsum([0, *map(len, parts)]))
+
+
+def _steps(start: Floats, end: Floats) -> Floats:
+    """Points (n, 3) [mm] evenly from ``start``, without it, to ``end``."""
+    return np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / REACHES)) + 1)[1:]
+
+
+def _nearest(exempt: Exemption, i: int, ends: Floats) -> Distances:
+    """The closest points of the area of attachment ``i`` to ``ends`` (k, 2, 3), end by end (2 k,)."""
     part = exempt.part[exempt.by == i]
-    area = Surface(part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3))
-    return distances(ends.reshape(-1, 3), area).distance.reshape(ends.shape[:2])
+    return distances(ends.reshape(-1, 3), Surface(part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3)))

@@ -64,12 +64,17 @@ class Chmd(Record):
 
 
 class Fibres(Record):
-    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``."""
+    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
+
+    ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, go on in the muscle or along its surface
+    to the nearest point of it.
+    """
 
     polylines: PolylineFile | None = None
     traced: Traced | None = None
     kohout_kukacka: KohoutKukacka | None = None
     chmd: Chmd | None = None
+    complete: bool = False
 
     _check = one_of("polylines", "traced", "kohout_kukacka", "chmd")
 

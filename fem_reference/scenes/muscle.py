@@ -187,9 +187,18 @@ class Outline(Record):
     reach: PositiveLength
 
 
+class Landmarks(Record):
+    """The middle of a ``cloud`` of landmarks in a file."""
+
+    file: str
+    unit: LengthUnit
+    cloud: str
+
+
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
-    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly.
+    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
+    a straight ``tendon`` to a point of the bone: in their lengths only, it does not pull.
     """
 
     name: Name
@@ -198,6 +207,7 @@ class Attachment(Record):
     vertices: VertexList | None = None
     within: PositiveLength | None = None
     outline: Outline | None = None
+    tendon: Landmarks | None = None
 
     _check = one_of("vertices", "within", "outline")
 

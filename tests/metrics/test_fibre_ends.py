@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.motion import apply
-from fem_reference.metrics import Measure, MeasurementContext, context_of, measure
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, context_of, measure
+from fem_reference.metrics.fibre_length import lengths_at
 from fem_reference.runs.store import Outcome, Run
 from tests.problems.test_fibre_ends import BAR, BOTTOM, TOP, TURN, lines, setup
 
@@ -76,6 +77,29 @@ def test_a_run_whose_fibres_begin_elsewhere_is_measured_from_there() -> None:
     other = lines(([2, 2, 0], [2, 2, 50]))
     strange = replace(RUN, fibres=other, fibre_positions=np.stack([other.points + 5.0] * 2))
     assert_allclose(ends(strange)[1].values, ends(RUN)[1].values, atol=1e-9)
+
+
+@pytest.mark.parametrize("interior", [True, False])
+def test_a_fibre_with_a_tendon_is_as_long_as_both(interior: bool) -> None:
+    """The second fibre of two, 40 mm, ends 10 mm below the top; its tendon goes from there to (7, 5, 70), which turns by a right
+    angle to (7, -20, 55), while the body stays: from 30 to sqrt(25^2 + 15^2) mm.
+    """
+    given = lines(([2, 2, 0], [2, 2, 50]), ([7, 5, 0], [7, 5, 40]))
+    tied = replace(SETUP, attached=(SETUP.attached[0], replace(SETUP.attached[1], tendon=np.array([7.0, 5, 70]))))
+    still = replace(
+        RUN, positions=np.stack([BAR.points] * 2), fibres=given, fibre_positions=np.stack([given.points] * 2)
+    )
+    known = context_of(tied, still)
+    assert known.ends is not None
+    pull = np.sqrt(25**2 + 15**2) - 30
+    run = still if interior else replace(still, fibres=None, fibre_positions=None)
+    from_rest = {one.statistic: one.values for one in measure(run, at_rest(run), known, ["fibre_length"])}
+    assert_allclose(from_rest["mean"], [0, pull / 2], atol=1e-9)
+    assert_allclose(from_rest["max_percent"], [0, 100 * abs(pull) / 70], atol=1e-9)
+    assert_allclose(lengths_at(given.points, 0, known), [50, 70], rtol=1e-12)
+    # Against a run with the same bones nothing is different.
+    for one in measure(run, still, known, ["fibre_length"]):
+        assert_allclose(one.values, 0, atol=1e-9)
 
 
 def test_a_muscle_without_attachments_has_none() -> None:

@@ -1,5 +1,7 @@
 """The ends of fibres: distances from attached areas in closed form, and the bones that they belong to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapes
@@ -7,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import RigidMotion
-from fem_reference.problems.fibre_ends import FibreEnds, attached_ends, ends_of
+from fem_reference.problems.fibre_ends import FibreEnds, attached_ends, completed, ends_of
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 
 BAR = shapes.skin(shapes.box((2, 2, 5), (10.0, 10.0, 50.0)))
@@ -83,6 +85,53 @@ def test_single_vertices_attach_half_of_the_edges_around_them() -> None:
     found = ends_of_setup(setup(("bottom", 0, BOTTOM), ("side", 1, SIDE)), lines(([5, 5, 0], [3, 5, 14])))
     assert found is not None
     assert_allclose(found.distance, [[0, 3]], atol=1e-12)
+
+
+def with_tendon(point: list[float]) -> Setup:
+    """The bar whose upper attachment has a tendon to a ``point`` of the bone that is lifted."""
+    given = setup(("bottom", 0, BOTTOM), ("top", 1, TOP))
+    top = replace(given.attached[1], tendon=np.array(point))
+    return replace(given, attached=(given.attached[0], top))
+
+
+def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
+    """From (14, 5, 47) to (14, 9, 50), 5 mm; lifted by 10 mm, and the end by 1: from (14, 5, 48) to (14, 9, 60), sqrt(160)."""
+    given = lines(([2, 2, 0], [2, 2, 50]), ([5, 5, 0], [14, 5, 47]))
+    found = ends_of_setup(with_tendon([14, 9, 50]), given)
+    assert found is not None
+    assert not found.beside.any()
+    assert (found.facts["fibre_ends_beyond_2_mm"], found.facts["fibre_ends_by_tendon"]) == (0, 1)
+    assert_allclose(found.beyond(ends_of(given), 0), [0, 5], rtol=1e-12)
+    moved = ends_of(given) + [0, 0, 1]
+    assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)
+    # An end by a tendon is at its bone; the others are 1 mm off the bone that rests, 9 mm off the bone that is lifted by 10.
+    assert_allclose(found.off(moved, ends_of(given), 5), [[1, 9], [1, 0]], rtol=1e-12)
+    lost = np.where(np.arange(3) == 0, np.nan, moved)
+    assert np.isnan(found.off(lost, ends_of(given), 5)).all()
+    assert np.isnan(found.beyond(lost, 5)).tolist() == [False, True]
+
+
+def test_fibres_are_completed_to_the_closest_point_of_their_attachment() -> None:
+    """At both ends, in steps of 2 mm or less; what reaches stays."""
+    given = lines(([2, 2, 1], [2, 2, 49]), ([14, 5, 3], [8, 3, 40]))
+    bar = setup(("bottom", 0, BOTTOM), ("top", 1, TOP))
+    found = ends_of_setup(bar, given)
+    assert found is not None
+    assert found.beside.tolist() == [[False, False], [True, True]]
+    whole = completed(given, found)
+    assert_allclose(whole.points[:3], given.points[:3])
+    second = whole.points[3:]
+    assert_allclose(second[[0, -1]], [[10, 5, 0], [8, 3, 50]], atol=1e-12)
+    assert_allclose(second[3:6], given.points[3:])
+    assert np.linalg.norm(np.diff(second, axis=0), axis=1)[[0, 1, 2, 5, 6, 7, 8, 9]].max() < 2 + 1e-9
+    assert_allclose(whole.lengths()[1], 5 + given.lengths()[1] + 10, rtol=1e-12)
+    again = ends_of_setup(bar, whole)
+    assert again is not None
+    assert again.distance.max() <= 1 + 1e-9
+    # With a tendon the last end goes on to the bone instead.
+    tied = ends_of_setup(with_tendon([0, 0, 60]), given)
+    assert tied is not None
+    assert tied.beside.tolist() == [[False, False], [True, False]]
 
 
 def test_without_attachments_there_is_nothing_to_reach() -> None:

@@ -150,7 +150,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "bone[0].colour",
             "box, capsule, cylinder, distance_error, distance_rounding, half_space, motion, name, sphere, surface, unit",
         ),
-        ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, vertices, within"),
+        ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, tendon, vertices, within"),
         ("[[effect]]\n", "effect[0].colour", "mu"),
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, flux, start"),
         ("[frames]\n", "frames.colour", "every, first, interval, last"),
