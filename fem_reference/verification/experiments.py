@@ -87,8 +87,15 @@ _STRETCH, _SD = ratio(*_SARCOMERES)
 _ORDER = "An order: 1 where both are met by 1 % and more, 0 where not."
 _LIMIT = "A law of fibres that pull in tension only meets neither."
 ORDERS = Quantity(
-    *("cube_both_orders", "Stiffer along the fibres in compression and across them in tension", "takaza_2013"),
-    *(muscle_cubes.both_orders, (), 1.0, 0.5, _ORDER, _LIMIT),
+    name="cube_both_orders",
+    title="Stiffer along the fibres in compression and across them in tension",
+    experiment="takaza_2013",
+    of=muscle_cubes.both_orders,
+    facts=(),
+    truth=1.0,
+    within=0.5,
+    because=_ORDER,
+    limit=_LIMIT,
 )
 
 

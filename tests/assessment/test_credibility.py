@@ -9,8 +9,8 @@ import pytest
 from fem_reference.assessment.catalogue import Finding, Refinement, Result, result
 from fem_reference.assessment.credibility import (
     Beside,
-    Claim,
     Credibility,
+    Evidence,
     Fitted,
     Row,
     claims,
@@ -24,7 +24,9 @@ from fem_reference.assessment.muscle_cubes import QUANTITIES
 from fem_reference.verification import runner
 from tests.verification.stand_ins import entry
 
-CLAIM = Claim(name="Stress", unit="kPa", verified=("blocks",), closed_forms="Blocks", other_codes="none", bar="1 kPa")
+CLAIM = Evidence(
+    name="Stress", unit="kPa", verified=("blocks",), closed_forms="Blocks", other_codes="none", bar="1 kPa"
+)
 SARCOMERES = tuple(find("chen_2016", "sarcomere_length", f"{angle} deg") for angle in (110, 50))
 QUOTED = (find("van_loocke_2006", "poisson_ratio", "both strains across"),)
 
