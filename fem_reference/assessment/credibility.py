@@ -154,7 +154,8 @@ def of_arms(arms: ArmsBeside) -> Beside:
     return Beside(
         *(f"{arms.case}-{arms.experiment}", title, "%", share, reached.value, _ROUNDED, None),
         *(share >= reached.value - _ROUNDED, False),
-        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; {arms.setting}",
+        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; "
+        f"{arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm",
     )
 
 

@@ -76,7 +76,7 @@ def facts(found: Credibility) -> dict[str, Any]:
     arms = [
         {
             **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "setting")},
-            **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter")},
+            **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter", "coarser")},
             "poses": len(one.found.angles),
         }
         for one in found.arms

@@ -43,9 +43,8 @@ def graded(*beside: Beside) -> Row:
 def arms(low: float, high: float, published: tuple[float, float], muscle: str = "gluteus_maximus") -> ArmsBeside:
     at = np.arange(0.0, 20.0, 2.0)
     sides = [Range(at, np.full(10, one), np.full(10, other)) for one, other in ((low, high), published)]
-    return ArmsBeside(
-        "case", muscle, "extension", "someone", "coarse", sides[0], np.full(10, (low + high) / 2), sides[1]
-    )
+    names = ("case", muscle, "extension", "someone", "coarse")
+    return ArmsBeside(*names, sides[0], np.full(10, (low + high) / 2), sides[1], 0.1)
 
 
 def found() -> Credibility:
