@@ -49,7 +49,7 @@ def vastus_stretch(_: Lab, arm: float) -> Finding:
     found = [math.hypot(along + one * _ANGLES / length, across) for one in (arm - 5, arm, arm + 5)]
     note = (
         f"Moment arms 5 mm less and more give {found[0]:.2f} and {found[2]:.2f}. Tendon and aponeurosis are rigid here; in a body "
-        "they take a part."
+        "they take a part. Architecture and moment arm are from memory."
     )
     return Finding(found[1], note=note)
 
