@@ -22,7 +22,7 @@ _ROUNDED = 0.5  # of a share that is published in whole per cent
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
-class Claim(Record):
+class Evidence(Record):
     """The evidence of a quantity as it is stated: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in
     words, the numerical ``bar``, facts that are its model ``band``, and its comparisons with experiments.
     """
@@ -40,10 +40,10 @@ class Claim(Record):
 
 
 class _File(Record):
-    quantity: tuple[Claim, ...]
+    quantity: tuple[Evidence, ...]
 
 
-def claims() -> tuple[Claim, ...]:
+def claims() -> tuple[Evidence, ...]:
     """The stated evidence, by quantity."""
     return parse(_File, tomllib.loads(FILE.read_text(encoding="utf-8")), FILE.name).quantity
 
@@ -77,7 +77,7 @@ class Row:
     ``band`` of facts, least and greatest; comparisons ``beside`` experiments.
     """
 
-    claim: Claim
+    claim: Evidence
     kinds: Mapping[str, int]
     orders: tuple[float, ...]
     band: tuple[Fact, ...]
@@ -115,7 +115,7 @@ class Row:
         return "validated" if any(one.validates for one in self.beside) else "indicative"
 
 
-def row(claim: Claim, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
+def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
     """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
 
     KeyError where an experiment was not measured, LookupError where a group of the catalogue does not exist.
@@ -126,7 +126,7 @@ def row(claim: Claim, entries: Iterable[Entry], results: Mapping[str, Result], a
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
     beside = [of_result(results[name]) for name in claim.experiments]
     beside += [of_arms(one) for one in arms] if claim.arms else []
-    kinds, band = Counter(one.kind for one in behind), experiments.model_band(claim.band)
+    kinds, band = Counter(str(one.kind) for one in behind), experiments.model_band(claim.band)
     return Row(claim, kinds, tuple(sorted(orders)), band, tuple(beside))
 
 
@@ -154,7 +154,8 @@ def of_arms(arms: ArmsBeside) -> Beside:
     return Beside(
         *(f"{arms.case}-{arms.experiment}", title, "%", share, reached.value, _ROUNDED, None),
         *(share >= reached.value - _ROUNDED, False),
-        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; {arms.setting}",
+        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; "
+        f"{arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm",
     )
 
 

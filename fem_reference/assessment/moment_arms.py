@@ -77,8 +77,8 @@ class ArmsBeside:
     [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, the ``published`` range, whose sides are equal where
     it is one curve.
 
-    ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run; ``bar``: its error bar [mm] of an
-    arm, NaN where it was not estimated.
+    ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run; ``coarser``: the greatest change
+    of the mean arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str
@@ -89,7 +89,7 @@ class ArmsBeside:
     found: Range
     middle: Floats
     published: Range
-    bar: float = float("nan")
+    coarser: float
 
     @property
     def is_curve(self) -> bool:

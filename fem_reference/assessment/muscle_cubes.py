@@ -153,33 +153,25 @@ def _tension() -> Quantity:
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
     because = "An order: 1 where it is met by 1 % and more, 0 where not."
-    return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit)
+    return Quantity(name, f"Cube in compression: {title}", fact.experiment, of, (fact,), 1.0, 0.5, because, limit)
 
+
+_MIDWAY, _ACROSS = find(LOOCKE, "softest_angle", ""), find(WALTER, "stiffest_angle", "")
+_OTHER = "the other way across"
 
 QUANTITIES = (
     _squeezed("cube_poisson_along", "along its fibres: Poisson ratio", "both strains across", 0, 1),
     _squeezed(
-        "cube_poisson_fibre",
-        "across its fibres: Poisson ratio along them",
-        "load across the fibres; strain along",
-        90,
-        1,
+        "cube_poisson_fibre", "across its fibres: Poisson ratio along them", "across the fibres; strain along", 90, 1
     ),
     _squeezed(
-        *("cube_poisson_across", "across its fibres: Poisson ratio the other way across"),
-        *("load across the fibres; strain across", 90, 2),
+        "cube_poisson_across", f"across its fibres: Poisson ratio {_OTHER}", "across the fibres; strain across", 90, 2
     ),
     _ratio_by_symmetry(),
-    _order(
-        *("cube_softest_midway", "Cube in compression: softest with fibres at 45 degrees"),
-        *(find(LOOCKE, "softest_angle", ""), softest_midway, _TENSION_ONLY),
-    ),
-    _order(
-        *("cube_stiffest_across", "Cube in compression: stiffest across its fibres (soleus of rabbits)"),
-        *(find(WALTER, "stiffest_angle", ""), stiffest_across),
-    ),
+    _order("cube_softest_midway", "softest with fibres at 45 degrees", _MIDWAY, softest_midway, _TENSION_ONLY),
+    _order("cube_stiffest_across", "stiffest across its fibres (soleus of rabbits)", _ACROSS, stiffest_across),
     _confinement(),
     _tension(),
-    _pulled("strip_poisson_fibre", "along them", "tension across the fibres; strain along", 1),
-    _pulled("strip_poisson_across", "the other way across", "tension across the fibres; strain across", 2),
+    _pulled("strip_poisson_fibre", "along them", "across the fibres; strain along", 1),
+    _pulled("strip_poisson_across", _OTHER, "across the fibres; strain across", 2),
 )

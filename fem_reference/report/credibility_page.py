@@ -40,7 +40,7 @@ def page(found: Credibility) -> Page:
 
 def said(found: Credibility) -> str:
     """The number of quantities by grade, and of comparisons that are met."""
-    counts = Counter(row.grade for row in found.rows)
+    counts = Counter(str(row.grade) for row in found.rows)
     grades = ", ".join(f"{counts[grade]} {grade}" for grade in GRADES if counts[grade])
     beside = [one for row in found.rows for one in row.beside]
     return (
@@ -76,7 +76,7 @@ def facts(found: Credibility) -> dict[str, Any]:
     arms = [
         {
             **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "setting")},
-            **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter")},
+            **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter", "coarser")},
             "poses": len(one.found.angles),
         }
         for one in found.arms

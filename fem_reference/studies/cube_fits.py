@@ -1,6 +1,6 @@
 """The best fit of laws to measured cubes, beside the shipped material, which is not fitted: what a law could reach at all."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -11,7 +11,7 @@ from fem_reference.assessment.muscle_cubes import FIBRES, LOOCKE, QUANTITIES, SH
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 
-Parameters = dict[str, tuple[float, tuple[float, float] | None]]
+Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
 _ORDER = 0.5  # the uncertainty of an order, which has no slope
 _STEP = 1e-4  # of a parameter's logarithm, against 1e-8 that root finding leaves
 _SHEAR = SHIPPED[0].parameters[0][1]

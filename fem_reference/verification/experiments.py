@@ -49,7 +49,7 @@ def vastus_stretch(_: Lab, arm: float) -> Finding:
     found = [math.hypot(along + one * _ANGLES / length, across) for one in (arm - 5, arm, arm + 5)]
     note = (
         f"Moment arms 5 mm less and more give {found[0]:.2f} and {found[2]:.2f}. Tendon and aponeurosis are rigid here; in a body "
-        "they take a part."
+        "they take a part. Architecture and moment arm are from memory."
     )
     return Finding(found[1], note=note)
 
@@ -87,8 +87,15 @@ _STRETCH, _SD = ratio(*_SARCOMERES)
 _ORDER = "An order: 1 where both are met by 1 % and more, 0 where not."
 _LIMIT = "A law of fibres that pull in tension only meets neither."
 ORDERS = Quantity(
-    *("cube_both_orders", "Stiffer along the fibres in compression and across them in tension", "takaza_2013"),
-    *(muscle_cubes.both_orders, (), 1.0, 0.5, _ORDER, _LIMIT),
+    name="cube_both_orders",
+    title="Stiffer along the fibres in compression and across them in tension",
+    experiment="takaza_2013",
+    of=muscle_cubes.both_orders,
+    facts=(),
+    truth=1.0,
+    within=0.5,
+    because=_ORDER,
+    limit=_LIMIT,
 )
 
 

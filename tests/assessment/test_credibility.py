@@ -9,8 +9,8 @@ import pytest
 from fem_reference.assessment.catalogue import Finding, Refinement, Result, result
 from fem_reference.assessment.credibility import (
     Beside,
-    Claim,
     Credibility,
+    Evidence,
     Fitted,
     Row,
     claims,
@@ -24,7 +24,9 @@ from fem_reference.assessment.muscle_cubes import QUANTITIES
 from fem_reference.verification import runner
 from tests.verification.stand_ins import entry
 
-CLAIM = Claim(name="Stress", unit="kPa", verified=("blocks",), closed_forms="Blocks", other_codes="none", bar="1 kPa")
+CLAIM = Evidence(
+    name="Stress", unit="kPa", verified=("blocks",), closed_forms="Blocks", other_codes="none", bar="1 kPa"
+)
 SARCOMERES = tuple(find("chen_2016", "sarcomere_length", f"{angle} deg") for angle in (110, 50))
 QUOTED = (find("van_loocke_2006", "poisson_ratio", "both strains across"),)
 
@@ -41,9 +43,8 @@ def graded(*beside: Beside) -> Row:
 def arms(low: float, high: float, published: tuple[float, float], muscle: str = "gluteus_maximus") -> ArmsBeside:
     at = np.arange(0.0, 20.0, 2.0)
     sides = [Range(at, np.full(10, one), np.full(10, other)) for one, other in ((low, high), published)]
-    return ArmsBeside(
-        "case", muscle, "extension", "someone", "coarse", sides[0], np.full(10, (low + high) / 2), sides[1]
-    )
+    names = ("case", muscle, "extension", "someone", "coarse")
+    return ArmsBeside(*names, sides[0], np.full(10, (low + high) / 2), sides[1], 0.1)
 
 
 def found() -> Credibility:

@@ -53,6 +53,8 @@ def test_experiments_stand_apart_and_outside_is_no_failure() -> None:
         assert '<span class="badge outside">outside</span>' in text
         assert "0 of 1 experiments met within their uncertainty: outside is a finding" in text
         assert text.count("<svg ") == drawings
+        assert "0 of 1 within</small>" in text
+        assert "<b>Uncertainty:</b>" in text
     assert "experiments met" not in verify_page.page(verification(made())).html()
 
 
