@@ -79,7 +79,7 @@ K1, K2, K3 = (Parameter(f"k{i}", f"spring {i}", "N/mm", 1.5, 1.0, 3.0, "uniform"
 
 
 def test_the_interval_of_a_line_is_that_of_regression() -> None:
-    """k = sum(x y) / sum(x^2), and half its interval t s / sqrt(sum(x^2)), s^2 = sum((y - k x)^2) / (n - 1)."""
+    """The slope is sum(x y) / sum(x^2), and half its interval t s / sqrt(sum(x^2)), s^2 = sum((y - k x)^2) / (n - 1)."""
     x = np.arange(1.0, 11.0)
     y = 1.7 * x + 0.3 * np.random.default_rng(5).standard_normal(10)
     (one,) = fit(lambda points: [K1.at(float(p[0])) * x for p in points], (K1,), data(y, 0.1), "k").estimates
