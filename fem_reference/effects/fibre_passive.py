@@ -9,10 +9,10 @@ from fem_reference.effects.fibre_active import PEAK_STRESS
 from fem_reference.foundations.limits import Limit, Range
 from fem_reference.foundations.units import PositivePressure
 
-# In this form Thelen's exp(k (l - 1)/e) - 1 over exp(k) - 1 has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6 or 0.5.
+# In this form Thelen's exp(k (l - 1)/e) - 1 over exp(k) - 1 has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6.
 _SOURCE = (
     "Blemker, Pinsky and Delp 2005 (0.05 and 6.6, doi 10.1016/j.jbiomech.2004.04.009) to Thelen 2003 (doi 10.1115/1.1531112, "
-    "exponent 5, strain 0.6 in young and 0.5 in old people: 0.00678 and 8.33 or 10)"
+    "exponent 5 and strain 0.6 at the peak active stress: 0.00678 and 8.33)"
 )
 
 
@@ -38,7 +38,7 @@ class FibrePassive(PassiveFibres):
     published: ClassVar[dict[str, Range]] = {
         "stress": PEAK_STRESS,
         "p1": Range(low=0.00678, high=0.05, source=_SOURCE),
-        "p2": Range(low=6.6, high=10.0, source=_SOURCE),
+        "p2": Range(low=6.6, high=8.33, source=_SOURCE),
     }
     stress: PositivePressure
     p1: float = Field(gt=0)

@@ -91,28 +91,28 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames, with the error bar of the reference around the case's own answer, and the candidates."""
-    return over_frames(f"band-{band.quantity}", band.title, band.unit, partial(_draw, found, band))
+    """A band over the frames, with the error bar of the reference and the candidates: all less the case's own answer, beside which
+    a band would often be too narrow to see.
+    """
+    title = band.title if band.distance else f"{band.title}: difference from that of the case"
+    return over_frames(f"band-{band.quantity}", title, band.unit, partial(_draw, found, band))
 
 
 def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
-    frames = np.asarray(band.numbers, float)
-    low = np.zeros(len(frames)) if band.distance else band.low
+    frames, bar = np.asarray(band.numbers, float), np.zeros(len(band.numbers)) if band.bar is None else band.bar
+    low, high = (np.zeros(len(frames)) if band.distance else band.low - band.nominal), band.high - band.nominal
     label = "95 % of the runs below" if band.distance else "5 to 95 % of the runs"
-    axes.fill_between(frames, low, band.high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
-    axes.plot(frames, band.median, color=_SHADE, linewidth=1.2, label="median")
-    if not band.distance:
-        axes.plot(frames, band.nominal, color=REFERENCE, linewidth=2.0, label="the case")
+    axes.fill_between(frames, low, high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
+    axes.plot(frames, band.median - band.nominal, color=_SHADE, linewidth=1.2, label="median")
     if band.bar is not None:
-        below = np.zeros(len(frames)) if band.distance else band.nominal - band.bar
-        above = band.nominal + band.bar
-        axes.fill_between(frames, below, above, color=BAND, linewidth=0, label="error bar")
-    shown = np.concatenate([low, band.high, [] if band.bar is None else band.nominal + band.bar])
-    bottom, top = (float(one(shown)) for one in (np.nanmin, np.nanmax))
+        axes.fill_between(frames, 0 if band.distance else -bar, bar, color=BAND, linewidth=0, label="error bar")
+    if not band.distance:
+        axes.axhline(0, color=REFERENCE, linewidth=1.5, label="the case")
     for i, one in enumerate([one for one in found.placed if one.quantity == band.quantity]):
-        axes.plot(frames, one.values, linewidth=1.0, label=one.candidate, **look_of(i + 2))
+        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **look_of(i + 2))
+    bottom, top = min(np.nanmin(low), 0 if band.distance else np.nanmin(-bar)), max(np.nanmax(high), np.nanmax(bar))
     room = _BEYOND * (top - bottom) or 1.0
-    axes.set_ylim(-0.03 * room if band.distance else bottom - room / 2, top + room)
+    axes.set_ylim(-0.03 * room if band.distance else bottom - room / 2, top + room / (1 if band.distance else 2))
 
 
 def shares(found: Uncertainty, band: Band) -> Drawing:

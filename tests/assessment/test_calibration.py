@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from fem_reference import effects
 from fem_reference.assessment.calibration import Calibration, Row, fit, read
@@ -75,6 +76,16 @@ def line(points: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 K1, K2, K3 = (Parameter(f"k{i}", f"spring {i}", "N/mm", 1.5, 1.0, 3.0, "uniform", "") for i in (1, 2, 3))
+
+
+def test_the_interval_of_a_line_is_that_of_regression() -> None:
+    """The slope is sum(x y) / sum(x^2), and half its interval t s / sqrt(sum(x^2)), s^2 = sum((y - k x)^2) / (n - 1)."""
+    x = np.arange(1.0, 11.0)
+    y = 1.7 * x + 0.3 * np.random.default_rng(5).standard_normal(10)
+    (one,) = fit(lambda points: [K1.at(float(p[0])) * x for p in points], (K1,), data(y, 0.1), "k").estimates
+    slope = x @ y / (x @ x)
+    half = stats.t.ppf(0.975, 9) * np.sqrt(((y - slope * x) ** 2).sum() / 9 / (x @ x))
+    assert [one.low, one.value, one.high] == pytest.approx([slope - half, slope, slope + half], abs=1e-5)
 
 
 def test_what_only_acts_together_is_not_determined_and_named() -> None:

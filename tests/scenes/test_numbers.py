@@ -6,6 +6,9 @@ import pytest
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile, numbers
+from tests.scenes.bars import RAMP
+
+NO_CONTROL = {"key": "effect[0].mu", "value": "10 kPa", "because": "it is softer then"}
 
 
 def test_numbers_and_units_are_those_of_the_file(bar: Path) -> None:
@@ -56,3 +59,19 @@ def test_a_value_is_checked_as_in_a_file(bar: Path) -> None:
         numbers.changed(case, {"effect[0].mu": -0.01})
     with pytest.raises(InputError, match=r"effect\[0\]\.mu: got nan"):
         numbers.changed(case, {"effect[0].mu": float("nan")})
+
+
+def test_a_stiffness_that_may_be_missing_and_an_amount_of_a_ramp_are_numbers_too(bar: Path) -> None:
+    """As bands of attachments and of activation ask for."""
+    active = {"name": "fibre_active", "stress": "300 kPa", "optimal_stretch": 1.0, "ramp": RAMP}
+    effects = [{"name": "neo_hooke", "mu": "30 kPa"}, active]
+    given = {"attachment[0].stiffness": "100 kPa/mm", "effect": effects, "negative_control": NO_CONTROL}
+    case = casefile.read(bar, changes=given)
+    stiffness, amount = "attachment[0].stiffness", "effect[1].ramp[1].amount"
+    assert (numbers.number(case, stiffness), numbers.unit(case, stiffness)) == (pytest.approx(0.1), "MPa/mm")
+    assert numbers.title(case, amount) == "fibre_active ramp 2 amount"
+    changed = numbers.changed(case, {stiffness: 0.2, amount: 0.5})
+    other = [effects[0], active | {"ramp": [RAMP[0], RAMP[1] | {"amount": 0.5}]}]
+    assert changed == casefile.read(bar, changes=given | {stiffness: "200 kPa/mm", "effect": other})
+    with pytest.raises(InputError, match=r"effect\[1\]\.ramp\[1\]\.amount: got -1, want greater than or equal to 0"):
+        numbers.changed(case, {amount: -1})
