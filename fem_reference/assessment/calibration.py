@@ -31,7 +31,7 @@ Forward = Callable[[Sequence[Floats]], Sequence[Floats]]
 
 
 @dataclass(frozen=True)
-class Row:
+class Measurement:
     """A measurement: the ``value`` of a ``quantity`` at a ``frame``, with its standard deviation ``sd``, both in ``unit``; its
     ``place`` in the file.
     """
@@ -71,7 +71,7 @@ class Calibration:
 
     case: str
     estimates: tuple[Estimate, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[Measurement, ...]
     fitted: tuple[float, ...]
     scatter: float
     singular: tuple[float, ...]
@@ -79,7 +79,7 @@ class Calibration:
     runs: int
 
 
-def read(path: Path, units: Callable[[str, str], str]) -> tuple[Row, ...]:
+def read(path: Path, units: Callable[[str, str], str]) -> tuple[Measurement, ...]:
     """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError where there is none."""
     head, *lines = files.read_rows(path) or [[]]
     if tuple(one.strip() for one in head) != COLUMNS:
@@ -87,7 +87,7 @@ def read(path: Path, units: Callable[[str, str], str]) -> tuple[Row, ...]:
     return tuple(_row(line, f"{path}: row {i}", units) for i, line in enumerate(lines, start=2))
 
 
-def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Row:
+def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measurement:
     if len(line) != len(COLUMNS):
         raise InputError(place, f"{len(line)} entries", f"{len(COLUMNS)}: {', '.join(COLUMNS)}")
     frame, quantity, value, unit, sd = (one.strip() for one in line)
@@ -104,10 +104,10 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Row:
             ) from error
     if not numbers[1] > 0:
         raise InputError(f"{place}: sd", f'"{sd}"', "more than 0: a measurement has a standard deviation")
-    return Row(int(frame), quantity, numbers[0], own, numbers[1], place)
+    return Measurement(int(frame), quantity, numbers[0], own, numbers[1], place)
 
 
-def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Row], case: str) -> Calibration:
+def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
     """The parameters within their ranges whose values by ``forward`` are nearest to the measurements, in their standard deviations;
     from the case's own values on. InputError where there are no more measurements than parameters.
     """

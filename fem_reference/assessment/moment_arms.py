@@ -15,18 +15,18 @@ DEGREE, STEP = 4, 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Range:
+class ArmRange:
     """The least and greatest arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
 
     angles: Floats
     low: Floats
     high: Floats
 
-    def at(self, angles: Floats) -> "Range":
+    def at(self, angles: Floats) -> "ArmRange":
         """The range at other ``angles`` (b,) [deg], linear in between; NaN where it does not reach."""
         within = (angles >= self.angles.min()) & (angles <= self.angles.max())
         low, high = (np.interp(angles, self.angles, side) for side in (self.low, self.high))
-        return Range(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
+        return ArmRange(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
 
 
 def poses(angles: Floats) -> Floats:
@@ -45,12 +45,12 @@ def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
     return np.asarray(-np.stack(slopes, axis=1) * 180 / np.pi)
 
 
-def range_of(angles: Floats, arms: Floats) -> Range:
+def range_of(angles: Floats, arms: Floats) -> ArmRange:
     """The range of the ``arms`` (a, k) [mm] of fibres at ``angles`` (a,) [deg]."""
-    return Range(angles, arms.min(axis=1), arms.max(axis=1))
+    return ArmRange(angles, arms.min(axis=1), arms.max(axis=1))
 
 
-def share_inside(curve: Floats, found: Range) -> float:
+def share_inside(curve: Floats, found: ArmRange) -> float:
     """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, of those in which it is known; NaN for
     none. A range that is not a number contains nothing.
     """
@@ -61,7 +61,7 @@ def share_inside(curve: Floats, found: Range) -> float:
     return float(inside[known].mean())
 
 
-def overlap(found: Range, published: Range) -> float:
+def overlap(found: ArmRange, published: ArmRange) -> float:
     """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN where no pose is known."""
     known = np.isfinite(published.low) & np.isfinite(published.high)
     if not known.any():
@@ -86,9 +86,9 @@ class ArmsBeside:
     sense: str
     experiment: str
     setting: str
-    found: Range
+    found: ArmRange
     middle: Floats
-    published: Range
+    published: ArmRange
     coarser: float
 
     @property

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment import calibration
-from fem_reference.assessment.calibration import Calibration, Row
+from fem_reference.assessment.calibration import Calibration, Measurement
 from fem_reference.assessment.uncertainty import Parameter
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
@@ -99,14 +99,14 @@ def _runs(case: MuscleCase, values: Sequence[dict[str, float]], store: Path, wor
     return runs
 
 
-def _asked(case: MuscleCase, run: Run, rows: Sequence[Row], store: Path) -> Floats:
+def _asked(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path) -> Floats:
     """The values (m,) of a ``run`` that the ``rows`` ask for."""
     context = context_of(shared_bench(case, store).setup(), run)
     changes = change(run, context, sorted({row.quantity.partition(".")[0] for row in rows} - {"force", "position"}))
     return np.array([_value(run, row, changes) for row in rows])
 
 
-def _value(run: Run, row: Row, changes: Sequence[Measure]) -> float:
+def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
     """The value of a ``run`` at the frame of a ``row``, a statistic among its ``changes`` from rest."""
     kind, name, axis = _split(row.quantity)
     i = run.numbers.index(row.frame)

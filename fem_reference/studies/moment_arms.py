@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment import experiments
-from fem_reference.assessment.moment_arms import ArmsBeside, Range, fitted_arms, poses, range_of
+from fem_reference.assessment.moment_arms import ArmsBeside, ArmRange, fitted_arms, poses, range_of
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import context_of
@@ -93,7 +93,7 @@ def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
     return at, fitted_arms(flexion, both_lengths(run, run, context)[0], at)
 
 
-def published(scene: MuscleCase, experiment: str, muscle: str) -> Range:
+def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
     """The published curve or range of a ``muscle``, from its file in the data folder."""
     record = experiments.experiments()[experiment]
     path = scene.file(f"data:{record.file}", experiment)
@@ -107,14 +107,14 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> Range:
         raise InputError(str(path), repr(error), "angles and moment arms, as numbers below their heads") from None
 
 
-def _curve(rows: list[dict[str, str]]) -> Range:
+def _curve(rows: list[dict[str, str]]) -> ArmRange:
     angles, arms = (
         np.array([float(row[key]) for row in rows]) for key in ("hip_flexion_deg", "extension_moment_arm_mm")
     )
-    return Range(angles, arms, arms)
+    return ArmRange(angles, arms, arms)
 
 
-def _envelope(rows: list[dict[str, str]], muscle: str) -> Range:
+def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
     """The range in mm, of a file in cm, at the angles of both sides together."""
     sides = {}
     for bound in ("lower", "upper"):
@@ -123,4 +123,4 @@ def _envelope(rows: list[dict[str, str]], muscle: str) -> Range:
     (low_at, low), (high_at, high) = sides["lower"], sides["upper"]
     angles = np.unique(np.concatenate([low_at, high_at]))
     angles = angles[(angles >= max(low_at[0], high_at[0])) & (angles <= min(low_at[-1], high_at[-1]))]
-    return Range(angles, np.interp(angles, low_at, low), np.interp(angles, high_at, high))
+    return ArmRange(angles, np.interp(angles, low_at, low), np.interp(angles, high_at, high))

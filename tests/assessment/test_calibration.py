@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from fem_reference import effects
-from fem_reference.assessment.calibration import Calibration, Row, fit, read
+from fem_reference.assessment.calibration import Calibration, Measurement, fit, read
 from fem_reference.assessment.uncertainty import Parameter
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.material_point import fibre_tension
@@ -31,8 +31,8 @@ def forward(points: Sequence[np.ndarray]) -> list[np.ndarray]:
     return [tension(P1.at(float(one)), P2.at(float(other))) for one, other in points]
 
 
-def data(values: np.ndarray, sd: float = SD) -> list[Row]:
-    return [Row(i, "stress", float(value), "MPa", sd, f"row {i}") for i, value in enumerate(values)]
+def data(values: np.ndarray, sd: float = SD) -> list[Measurement]:
+    return [Measurement(i, "stress", float(value), "MPa", sd, f"row {i}") for i, value in enumerate(values)]
 
 
 def noisy(seed: int) -> Calibration:

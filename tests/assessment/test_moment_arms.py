@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fem_reference.assessment.moment_arms import ArmsBeside, Range, fitted_arms, overlap, poses, range_of, share_inside
+from fem_reference.assessment.moment_arms import ArmsBeside, ArmRange, fitted_arms, overlap, poses, range_of, share_inside
 from fem_reference.foundations.errors import InputError
 
 ANGLES = np.linspace(0, 57.3, 11)
 
 
-def flat(angles: np.ndarray, low: float, high: float) -> Range:
-    return Range(angles, np.full(len(angles), low), np.full(len(angles), high))
+def flat(angles: np.ndarray, low: float, high: float) -> ArmRange:
+    return ArmRange(angles, np.full(len(angles), low), np.full(len(angles), high))
 
 
 def test_poses_are_even_angles_within_those_of_the_frames() -> None:
@@ -49,8 +49,8 @@ def test_a_curve_is_inside_in_a_known_share_of_poses() -> None:
 
 def test_an_overlap_is_the_covered_part_of_the_published_range() -> None:
     at = np.arange(3.0)
-    published = Range(at, np.array([10.0, 10.0, 10.0]), np.array([20.0, 20.0, 20.0]))
-    found = Range(at, np.array([0.0, 15.0, 30.0]), np.array([100.0, 30.0, 40.0]))
+    published = ArmRange(at, np.array([10.0, 10.0, 10.0]), np.array([20.0, 20.0, 20.0]))
+    found = ArmRange(at, np.array([0.0, 15.0, 30.0]), np.array([100.0, 30.0, 40.0]))
     assert overlap(found, published) == pytest.approx((1 + 0.5 + 0) / 3)
     assert overlap(flat(at, np.nan, np.nan), published) == 0
     assert np.isnan(overlap(found, flat(at, np.nan, np.nan)))
@@ -71,7 +71,7 @@ def test_bias_and_scatter_are_of_the_mean_arm_from_the_middle() -> None:
     assert (beside.bias, beside.scatter, beside.is_curve) == (8.0, 3.0, False)  # 20 - 15 and 26 - 15
     lost = ArmsBeside(*names, found, np.array([20.0, np.nan]), flat(at, 10, 20), 0.0)
     assert np.isnan(lost.bias), "an arm of ours that is not a number is no pose to leave out"
-    partly = Range(at, np.array([10.0, np.nan]), np.array([20.0, np.nan]))
+    partly = ArmRange(at, np.array([10.0, np.nan]), np.array([20.0, np.nan]))
     assert ArmsBeside(*names, found, arms.mean(axis=1), partly, 0.0).bias == 5.0
     assert np.isnan(ArmsBeside(*names, found, arms.mean(axis=1), flat(at, np.nan, np.nan), 0.0).bias)
     curve = ArmsBeside(*names, found, arms.mean(axis=1), flat(at, 11, 11), 0.0)

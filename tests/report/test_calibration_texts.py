@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-from fem_reference.assessment.calibration import Calibration, Estimate, Row
+from fem_reference.assessment.calibration import Calibration, Estimate, Measurement
 from fem_reference.assessment.uncertainty import Parameter
 from fem_reference.report.calibration_texts import text
 
 MU = Parameter("effect[0].mu", "neo_hooke mu", "MPa", 0.01, 0.004, 0.02, "uniform", "")
-ROW = Row(10, "force.lid", 2.0, "N", 0.1, "row 2")
+ROW = Measurement(10, "force.lid", 2.0, "N", 0.1, "row 2")
 
 
 def found(scatter: float, *estimates: Estimate) -> Calibration:

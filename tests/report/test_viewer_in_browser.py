@@ -28,7 +28,11 @@ def browser(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Without the curves, of which nothing here is."""
-    monkeypatch.setattr(comparison_page, "curves", lambda _: [])
+
+    def curves(_):
+        return []
+
+    monkeypatch.setattr(comparison_page, "curves", curves)
 
 
 @pytest.fixture

@@ -86,9 +86,9 @@ WRONG = [
     (
         "effect[0].name",
         "hooke",
-        'effect[0].name: got "hooke", want one of active_tension, contact, damping, fibre_active',
+        'effect[0].name: got "hooke", want one of active_tension, collagen_across, contact',
     ),
-    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of active_tension, contact, damping, fibre_active'),
+    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of active_tension, collagen_across, contact'),
     ("effect", "hooke", 'effect: got "hooke", want'),
     ("effect", [], "effect: got [], want"),
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
