@@ -12,11 +12,12 @@ from pydantic import Field
 
 from fem_reference import metrics
 from fem_reference.assessment.differences import greatest
-from fem_reference.assessment.measured import CurrentMeasures, sample
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
 from fem_reference.foundations.version import __version__
+from fem_reference.geometry.distance import farthest_points
 from fem_reference.io import files, texts
 from fem_reference.metrics import Measure
 from fem_reference.scenes.muscle import MuscleCase
@@ -46,9 +47,7 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic: ``values`` per frame, the ``tolerance`` of a change of each, and the greatest magnitude allowed, ``within``,
-    all in ``unit``.
-    """
+    """One statistic: ``values`` per frame, the ``tolerance`` of a change, the greatest magnitude ``within``, all in ``unit``."""
 
     tolerance: float = Field(ge=0)
     unit: str
@@ -62,9 +61,7 @@ class StoredStatistic(Record):
 
 
 class Positions(Record):
-    """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
-    ``tolerance`` [mm] of the distance to them.
-    """
+    """Positions ``values`` (f, s, 3) [mm] of sampled ``vertices`` (s,) of ``CurrentMeasures.points``; their ``tolerance`` [mm]."""
 
     tolerance: float = Field(ge=0)
     values: tuple[tuple[tuple[float, float, float] | None, ...], ...]
@@ -120,7 +117,7 @@ def update(path: Path, current: CurrentMeasures) -> Baseline:
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
     kept = {} if before is None else before.measures
-    vertices = sample(current.rest, SAMPLED)
+    vertices = farthest_points(current.rest, SAMPLED)
     baseline = Baseline(
         candidate=current.candidate.name,
         case=current.scene.name,
@@ -162,13 +159,12 @@ def _check_shape(place: str, baseline: Baseline) -> None:
     """Raise InputError unless all lists that belong together are equally long, and every statistic exists."""
     known, frames = metrics.units(), len(baseline.frames)
     for name, stored in baseline.measures.items():
+        key = f"{place}: measures.{name}"
         if known.get(name) != stored.unit:
             want = "a statistic that there is" + (f", in {known[name]}" if name in known else "")
-            raise InputError(f"{place}: measures.{name}", f'one in "{stored.unit}"', want)
+            raise InputError(key, f'one in "{stored.unit}"', want)
         if len(stored.values) != frames:
-            raise InputError(
-                f"{place}: measures.{name}.values", f"{len(stored.values)} values", f"{frames}, one a frame"
-            )
+            raise InputError(f"{key}.values", f"{len(stored.values)} values", f"{frames}, one a frame")
     positions = baseline.positions
     if len(positions.values) != frames or {len(row) for row in positions.values} != {len(positions.vertices)}:
         want = f"{len(positions.vertices)} vertices in each of {frames} frames"
@@ -187,9 +183,8 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
     tolerance, within = limits(one, bars)
     if before is not None:
         tolerance, within = before.tolerance, within if before.within is None else before.within
-    values = tuple(
-        round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
-    )
+    digits = PLACES[one.unit]
+    values = tuple(round(value, digits) + 0.0 if math.isfinite(value) else None for value in one.values.tolist())
     return StoredStatistic(tolerance=tolerance, unit=one.unit, values=values, within=within)
 
 

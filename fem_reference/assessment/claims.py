@@ -49,9 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of tetrahedra (the reference's, the finer ones); ``missing``: by case, the reason of
-    omission.
-    """
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has none."""
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]
@@ -61,9 +59,7 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of the error ``bars`` of a reference: each bar of a ``"change"`` or ``"deviation"``, with the difference of the
-    reference's measures from those of the ``finer`` solution.
-    """
+    """The claims of the ``bars`` of a reference, each with the difference of its measures from those of a ``finer`` solution."""
     found = []
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)

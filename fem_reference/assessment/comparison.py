@@ -32,8 +32,7 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest
-    two.
+    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
 
     ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices to the finest
     solution of order 2. ``order`` is NaN where the errors are rounding.
@@ -113,9 +112,7 @@ class Comparison:
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
 
     def word_of(self, name: str) -> Word:
-        """The verdict on a run by its name; the reference fails where it did not converge, in spite of expectations that it
-        meets.
-        """
+        """The verdict on a run by its name; a reference that did not converge fails, even where it meets its expectations."""
         found = overall(one.word for one in self.verdicts if one.expectation.of == name)
         if name != "reference":
             return found
@@ -141,9 +138,8 @@ def compare(
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
-    deviations = {
-        run.name: _with_bars(measure(run, reference, context, candidate), "deviation", error_bars) for run in candidates
-    }
+    apart = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    deviations = {name: _with_bars(found, "deviation", error_bars) for name, found in apart.items()}
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
     changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
@@ -171,9 +167,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference. A muscle has none, as all its measures take their context from
-    one.
-    """
+    """The measures and verdicts of a ``run`` without a reference; none of a muscle, whose measures need the context of one."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
     measures = measure(run, run, context_of(setup, run), names(case.standards("reference")))

@@ -20,9 +20,7 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), over the frames where both are known; NaN where
-    the scale is 0.
-    """
+    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), where both are known; NaN where the scale is 0."""
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
@@ -36,16 +34,11 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
     With the motion ``moved`` (f,) [mm] of the surfaces given, the distance counts as at least its share of it in the median
     frame: two meshes agree better in some poses than in others by chance.
     """
-    size = apart if moved is None else np.maximum(apart, _median_share(apart, moved) * moved)
+    size = apart
+    if moved is not None:
+        known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
+        size = np.maximum(apart, float(np.median(apart[known] / moved[known])) * moved) if known.any() else size
     return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * size)
-
-
-def _median_share(apart: Floats, moved: Floats) -> float:
-    """The distance ``apart`` (f,) of surfaces over their motion ``moved`` (f,), in the median frame with motion; 0 without
-    any.
-    """
-    known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
-    return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
 
 
 def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:

@@ -2,7 +2,7 @@
 
 There are two sorts of bars. That of a candidate's deviation from the reference is the deviation of the reference's runs from each
 other: by the triangle inequality, another reference changes the deviation by at most that. That of the reference's own change from
-rest is the share of these deviations by which the changes of its runs differ.
+rest is the share of these deviations by which the changes of its runs differ. The bars of a body are differences of its states.
 """
 
 import json
@@ -10,18 +10,18 @@ import math
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, PlainValidator, TypeAdapter
 
 from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import files, texts
 from fem_reference.io.texts import plain
-from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
-from fem_reference.runs.store import Run
+from fem_reference.metrics import Measure, MeasurementContext, as_surface, change, described, measure, names, of_itself
+from fem_reference.runs.store import Frame, Run
 
 Of = Literal["change", "deviation"]
 FILE = "error_bar.json"
@@ -32,7 +32,8 @@ SAFETY = 1.25
 # evidence than three (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions
 # (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# The rest of an error of first order, relative to the change of the result when its cause is halved.
+# The rest of an error of first order, relative to the change of the result when its cause is halved. For the cells of a body this
+# is the least order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
 # The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where
 # displacement goes with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
@@ -94,9 +95,8 @@ class ErrorBars:
     @property
     def of_deviations(self) -> tuple[Measure, ...]:
         """The error bars of deviations from the reference, as measures."""
-        return tuple(
-            Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in self.bars if bar.of == "deviation"
-        )
+        bars = (bar for bar in self.bars if bar.of == "deviation")
+        return tuple(Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in bars)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +125,9 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of every statistic of every metric, of changes and of deviations, from the tetrahedra and the variations. A metric
-    of a run itself has no bars: its statistics are exact.
-    """
+    """The bars of changes and deviations, of every statistic of every metric but those of a run itself, which are exact."""
     comparing = [name for name in names() if not of_itself(name)]
-    surface = cache(_surface)
+    surface = cache(as_surface)
 
     @cache
     def measured(run: Run, other: Run | None) -> tuple[Measure, ...]:
@@ -199,11 +197,6 @@ def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Fl
     return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
 
 
-def _surface(run: Run) -> Run:
-    """The run as a candidate: a surface without an interior, so that lengths use the measurement context's extension."""
-    return replace(run, fibres=None, fibre_positions=None)
-
-
 def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Floats]:
     """The values (f,) of ``measures`` minus those of ``others``, by statistic."""
     return [one.values - other.values for one, other in zip(measures, others, strict=True)]
@@ -231,3 +224,52 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
         return bars
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
+
+
+@dataclass(frozen=True, eq=False)
+class BodyBars:
+    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
+    [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
+    [N mm]; NaN where unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
+    nodes; ``sharper`` describes the more accurate solution.
+    """
+
+    frames: tuple[float, ...]
+    points: Floats
+    forces: dict[str, Floats]
+    moments: dict[str, Floats]
+    energy: Floats
+    displacement: Floats
+    sharper: str
+
+
+def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
+    """The bars of the ``states`` of a body, the rest state first, from the ``finer`` states of a more accurate solution, which may
+    be fewer. ``shared`` (n,): the number of each point of the body in that solution, -1 for a point that it lacks; ``sharper``:
+    its differences in numerics, in words.
+    """
+    there = {state.number: state for state in finer}
+    pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]
+    left = SAFETY * VARIATION
+
+    def vectors(kind: str) -> dict[str, Floats]:
+        names = getattr(states[0], kind)
+        ends = {name: [[getattr(one, kind)[name] for one in pair] for pair in pairs] for name in names}
+        return {name: left * np.linalg.norm(np.diff(ways, axis=1)[:, 0], axis=1) for name, ways in ends.items()}
+
+    points = left * np.array([np.linalg.norm(one.points - other.points, axis=1) for one, other in pairs])
+    energy = left * np.array([abs(one.scalars["energy"] - other.scalars["energy"]) for one, other in pairs])
+    moved = np.array([np.linalg.norm(one.points - states[0].points) for one in states])
+    wrong = np.sqrt(np.sum(np.where(shared < 0, 0.0, points) ** 2, axis=1))
+    share = np.divide(wrong, moved, out=np.where(wrong > 0, np.inf, wrong), where=moved > 0)
+    frames = tuple(state.number for state in states)
+    return BodyBars(frames, points, vectors("forces"), vectors("moments"), energy, share, sharper)
+
+
+def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
+    """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
+    if other is None:
+        lost = np.full(3, np.nan)
+        blank: dict[str, Any] = {kind: dict.fromkeys(getattr(state, kind), lost) for kind in ("forces", "moments")}
+        return replace(state, points=np.full_like(state.points, np.nan), scalars={"energy": np.nan}, **blank)
+    return replace(other, points=np.where(shared[:, None] < 0, np.nan, other.points[shared]))

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` on the fibres of a case, of each of which ``known`` points were given: distances [mm] of the others from the
-    curve, root mean square and ``greatest``.
-    """
+    """A ``technique`` given ``known`` points of each fibre: distances [mm] of the others from its curve, rms and ``greatest``."""
 
     case: str
     technique: str
@@ -32,9 +30,7 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """The surface of a muscle with so many ``vertices`` by so many ``gaussians``: distances of vertices [mm], root mean square and
-    ``greatest``, and its volume over the true one.
-    """
+    """A muscle's surface of ``vertices`` by ``gaussians``: rms and ``greatest`` distance of vertices [mm], volume over the true."""
 
     case: str
     vertices: int

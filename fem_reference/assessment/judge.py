@@ -79,9 +79,7 @@ def overall(words: Iterable[Word]) -> Word:
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference, in words: it did not reach all frames, is unstable, is nearly inverted, left the range of its
-    laws, or lost energy.
-    """
+    """Reasons to doubt a reference, in words: frames it lacks, instability, near inversion, laws out of range, lost energy."""
     said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
@@ -156,9 +154,8 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
     word = overall(words)
     # The first frame that fails decides, else the inconclusive frame with the widest bar, else the frame farthest from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
-    widest = max(
-        range(len(values)), key=lambda k: (words[k] == "inconclusive", math.inf if math.isnan(known[k]) else known[k])
-    )
+    width = [math.inf if math.isnan(bar) else bar for bar in known]
+    widest = max(range(len(values)), key=lambda k: (words[k] == "inconclusive", width[k]))
     decides = words.index("fail") if word == "fail" else widest if word == "inconclusive" else furthest
     bar = None if bars is None else known[decides]
     frame = numbers[frames[decides]]

@@ -1,4 +1,4 @@
-"""A current candidate: its measures against the reference, and positions of a sample of its vertices."""
+"""A current candidate and its measures against the reference."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference import metrics
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
@@ -45,9 +45,7 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The reference's folder in the store, whose name depends on scene, settings and code; its solver where it has no
-        folder.
-        """
+        """The folder of the reference in the store, named by scene, settings and code; its solver where it has no folder."""
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 
@@ -70,15 +68,3 @@ class CurrentMeasures:
             return np.zeros(len(self.reference.numbers))
         found = None if self.error_bars is None else self.error_bars.find("deviation", metric, statistic)
         return np.full(len(self.reference.numbers), np.nan) if found is None else found.values
-
-
-def sample(points: Floats, count: int) -> Ints:
-    """Indices (k,) of at most ``count`` vertices of ``points`` (n, 3), each as far as possible from those before it; the first is
-    the farthest from the middle of all.
-    """
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    away = np.linalg.norm(points - points[chosen[0]], axis=1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)

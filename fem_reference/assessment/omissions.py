@@ -50,9 +50,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run called ``name`` by ``solver``: the ``whole``, the runs with each omission and with all; ``kept``: names of things
-    that are never omitted.
-    """
+    """A run ``name`` by ``solver``: the ``whole``, and with each of the ``omissions``; ``kept``: names of what is never omitted."""
 
     name: str
     solver: str
@@ -95,8 +93,7 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters where one of ``changes`` exceeds its error bar, and does not matter where all are below a
-    tenth of theirs.
+    """Judge an omission: it matters where one of ``changes`` exceeds its error bar, and not where all are below a tenth of it.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

@@ -19,9 +19,7 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be distinguished from
-    it.
-    """
+    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be told apart from it."""
 
     deviation: Deviation
     first: int
@@ -51,8 +49,7 @@ class Ranking:
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: one is less than another where their bars do not overlap; a deviation that is not a number
-    comes after all numbers.
+    """The places of ``deviations``: one is less than another where their bars do not overlap; what is no number comes last.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']
@@ -62,9 +59,8 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
     for one in ordered:
         better = sum(_less(other, one) for other in ordered)
         worse = sum(_less(one, other) for other in ordered)
-        alike = tuple(
-            other.name for other in ordered if other is not one and not _less(other, one) and not _less(one, other)
-        )
+        others = (other for other in ordered if other is not one)
+        alike = tuple(other.name for other in others if not _less(other, one) and not _less(one, other))
         found.append(Ranked(one, better + 1, len(ordered) - worse, alike))
     return tuple(found)
 

@@ -1,19 +1,20 @@
-"""Recommendation of a setting for an error or a time: the cheapest or most accurate measured one, on the case itself or on the
-most similar cases.
+"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and
+the transfer of settings, whose tetrahedra differ in size, to a case that is left out.
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from statistics import fmean
 
 import numpy as np
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import TETRAHEDRA, Point
-from fem_reference.assessment.transfer import is_elsewhere, setting, tetrahedra
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
+Features = Mapping[str, float]  # of a case, by name
 # The number of most similar other cases that are used.
 _ALIKE = 3
 # The share of expectations from other cases that are met on each left-out case, for the margin.
@@ -68,7 +69,7 @@ class Recommendation:
 
 
 def recommend(
-    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
+    features: Features, case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
     """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the most accurate whose time
     per frame [s] is at most ``limits["time"]``; with both limits, the cheapest within both. Only studies with the metric count.
@@ -80,18 +81,15 @@ def recommend(
     margins = Margins() if own else _margins(others, metric)
     known = _measured(own[0], metric) if own else list(_expected(features, others, metric, margins))
     of = (case,) if own else tuple(study.case for study in alike(features, others))
-    fitting = [
-        one for one in known if one.error <= limits.get("error", math.inf) and one.time <= limits.get("time", math.inf)
-    ]
+    most = {"error": math.inf, "time": math.inf} | dict(limits)
+    fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
     rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
     best = min(fitting, key=rank, default=None)
     nearest = None if best else min(known, key=lambda one: one.misses(limits), default=None)
     return Recommendation(best, nearest, len(known), margins, of, bool(own))
 
 
-def _comparable(
-    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str
-) -> Sequence[CaseStudy]:
+def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
     """The studies that are comparable with these features: lengths scale with the motion of bones, which there must be."""
     if _is_share(metric):
         return studies
@@ -103,23 +101,24 @@ def _comparable(
     return found
 
 
-def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+def _is_same(one: Features, other: Features) -> bool:
     """True where a case has the same features as when it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
-def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most like one with these features, the most alike first."""
-    return sorted(studies, key=lambda study: _distance(features, study.features))[:_ALIKE]
+def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
+    """The studies of the cases most like one with these features, the most alike first: by ratios, in powers of two; cases with
+    and without contact are far apart.
+    """
+
+    def distance(study: CaseStudy) -> float:
+        pairs = [(_compared(features, name), _compared(study.features, name)) for name in _COMPARED]
+        return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
+
+    return sorted(studies, key=distance)[:_ALIKE]
 
 
-def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Distance of two cases: over ratios, in powers of two; cases with and without contact are far apart."""
-    pairs = [(_compared(one, name), _compared(other, name)) for name in _COMPARED]
-    return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
-
-
-def _compared(features: Mapping[str, float], name: str) -> float:
+def _compared(features: Features, name: str) -> float:
     if name == "motion_to_size":
         return features["motion"] / features["size"]
     return min(features[name], 1.0) if name == "contact" else features[name]
@@ -132,12 +131,8 @@ def _measured(study: CaseStudy, metric: str) -> list[Expected]:
     return [Expected(point, error, time, (study.case,), bar) for point, (error, time) in known]
 
 
-def _expected(
-    features: Mapping[str, float], studies: Sequence[CaseStudy], metric: str, margins: Margins
-) -> Iterable[Expected]:
-    """The settings that were measured on all of the most similar cases. Errors scale with the motion, times with the triangles;
-    the worst of the cases counts.
-    """
+def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, margins: Margins) -> Iterable[Expected]:
+    """The settings measured on all of the most similar cases: the worst errors, scaled by motion, and times, by triangles."""
     chosen = alike(features, studies)
     by_key = [
         {setting(one.point, study): one for one in _measured(study, metric) if is_elsewhere(one.point)}
@@ -155,7 +150,7 @@ def _expected(
         )
 
 
-def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
+def scale(features: Features, other: Features, metric: str) -> float:
     """The factor from an error on the ``other`` case to one here: lengths scale with the motion, shares do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
@@ -164,10 +159,8 @@ def _is_share(metric: str) -> bool:
     return metric.startswith("volume.") or metric.endswith("_percent")
 
 
-def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
-    """A point of a studied case, translated to another: tetrahedra relative to the size of the case's own, doubled for each
-    refinement below zero.
-    """
+def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
+    """A point of a study for another case: tetrahedra relative to its own, doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point
@@ -191,3 +184,87 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
     if not errors:
         return Margins(2.0, 2.0)  # a single study shows nothing about others
     return Margins(*(max(1.0, float(np.quantile(ratios, _MET))) for ratios in (errors, times)))
+
+
+def setting(point: Point, study: CaseStudy) -> str:
+    """A key that identifies a setting across cases; tetrahedra count by their size relative to the case's own reference."""
+    scene = point.choice.get("scene", {})
+    if not is_elsewhere(point):
+        return f"{study.case}: {point.label}"
+    if "triangles" in scene:
+        return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
+    if scene:
+        factor, fewer = tetrahedra(point, study)
+        return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
+    return f"{point.solver}: {_settings(point)}"
+
+
+def is_elsewhere(point: Point) -> bool:
+    """True where a setting can be used on another case: only mesh keys of a scene are transferable."""
+    return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
+
+
+def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
+    """The size of a point's tetrahedra relative to the case's own before refinement, and its difference in refinements."""
+    scene = point.choice["scene"]
+    size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
+    return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
+
+
+def _settings(point: Point) -> str:
+    own = {name: value for name, value in point.choice.items() if name not in ("scene", "solver", "name")}
+    return ", ".join(f"{name} = {value}" for name, value in sorted(own.items(), key=str))
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and applied to that: their ``error`` there, the
+    ``best`` error of any of the same settings there, and that of the ``default`` (NaN where there is none).
+    """
+
+    solver: str
+    left_out: str
+    chosen: str
+    error: float
+    best: float
+    default: float
+
+    @property
+    def loss(self) -> float:
+        """The error over the least possible, minus one: 0 where the chosen settings are the best there too."""
+        return self.error / self.best - 1
+
+
+def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
+    """For every solver and case, the settings with the least mean logarithm of the error over the other cases, among those
+    measured on every case; an error below the bar of a truth counts as the bar.
+    """
+    by_solver: dict[str, dict[str, dict[str, float]]] = {}
+    defaults: dict[tuple[str, str], float] = {}
+    labels: dict[tuple[str, str], str] = {}
+    for study in studies:
+        for point in study.counted:
+            value = point.errors.get(error, math.nan)
+            if point.status != "converged" or not value > 0 or not is_elsewhere(point):
+                continue
+            key = setting(point, study)
+            labels[key, study.case] = point.label
+            by_solver.setdefault(point.solver, {}).setdefault(key, {})[study.case] = value
+            if point.is_default:
+                defaults.setdefault((point.solver, study.case), value)
+    found = list[Transfer]()
+    for solver, settings in by_solver.items():
+        cases = sorted({case for values in settings.values() for case in values})
+        everywhere = {label: values for label, values in settings.items() if len(values) == len(cases)}
+        for left_out in cases if len(cases) > 1 and everywhere else ():
+            chosen = _chosen(everywhere, cases, left_out)
+            errors = everywhere[chosen][left_out], min(values[left_out] for values in everywhere.values())
+            default = defaults.get((solver, left_out), math.nan)
+            found.append(Transfer(solver, left_out, labels[chosen, left_out], *errors, default))
+    return tuple(found)
+
+
+def _chosen(settings: dict[str, dict[str, float]], cases: Iterable[str], left_out: str) -> str:
+    """The key of the settings with the least mean logarithm of the error over all ``cases`` but the one ``left_out``."""
+    others = [case for case in cases if case != left_out]
+    return min(settings, key=lambda label: fmean(math.log(settings[label][case]) for case in others))

@@ -1,7 +1,6 @@
 """Checks of the states that a solver calls converged, from its recorded positions and forces, independent of its loop.
 
-Every frame is checked. Each check has its allowed value, and the frame and place where it comes nearest to that value, or exceeds
-it most.
+Every frame is checked. A check has its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
 """
 
 import math
@@ -67,9 +66,7 @@ class RunCheck:
         return math.inf if math.isnan(share) else share
 
     def __str__(self) -> str:
-        value, allowed = (
-            "not a number" if number is None else f"{number:.3g}" for number in (self.value, self.allowed)
-        )
+        value, allowed = ("not a number" if one is None else f"{one:.3g}" for one in (self.value, self.allowed))
         where = f" at {self.place}" if self.place else ""
         return f"{self.name}: {value}{self.unit and f' {self.unit}'} in frame {self.frame:g}{where}, allowed {allowed}"
 
@@ -173,16 +170,14 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
     bones = [bone for bone in problem.bones if bone.name in attached or (contact and contact.is_by(bone.name))]
-    alike = len({bone.motion for bone in bones}) == 1
+    alike, farthest = len({bone.motion for bone in bones}) == 1, 1.01 * diagonal(run.surface.points)
     for i, (before, number) in enumerate(pairwise(run.numbers), start=1):
         for bone in bones if counts[i] > 0 else ():
             turns = bone.motion is not None and bone.motion.centre is not None
             if bone.motion is None or (alike and not turns):
                 continue
             travelled = _travel(bone, before, number) / float(counts[i])
-            words, allowed, unit = (
-                ("turns", _TURN, "rad") if turns else ("slides", 1.01 * diagonal(run.surface.points), "mm")
-            )
+            words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", farthest, "mm")
             yield RunCheck(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
 
 
@@ -252,9 +247,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; minus that at rest, where this exceeds the give of contact. Never up to the middle of
-    a bone.
-    """
+    """Penetration of a bone and the muscle, minus that at rest where above the give of contact; never up to a bone's middle."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

@@ -83,9 +83,7 @@ class SolverResult:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene of the table: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement ``travel`` [mm],
-    and the outcome of the reference.
-    """
+    """A scene: ``title``, ``triangles`` of the muscle, greatest displacement ``travel`` [mm] and outcome of the reference."""
 
     case: str
     title: str
@@ -109,9 +107,7 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The ``results`` of all solvers on all ``scenarios``; ``missing``: by case, the reason of omission; the ``machines`` of the
-    runs.
-    """
+    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it is left out; the ``machines`` of the runs."""
 
     kinds: tuple[SolverKind, ...]
     scenarios: tuple[Scenario, ...]

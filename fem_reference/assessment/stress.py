@@ -137,9 +137,7 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's own result (none where empty): no plain success, and refused where there is
-    ``no_solution``.
-    """
+    """``cell`` with a ``doubt`` about the solver's own result, if any: no plain success; refused where there is ``no_solution``."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:

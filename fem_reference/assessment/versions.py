@@ -77,9 +77,7 @@ class Change:
 
     @property
     def word(self) -> Word:
-        """The verdict on the change. A change below rounding or the error bar is neither; "mixed" is nearer in some frames and
-        farther away in others.
-        """
+        """The verdict on the change, neutral below rounding or the error bar; "mixed" is nearer in some frames, farther in some."""
         if math.isnan(self.by):
             return "no number"
         if abs(self.by) <= 10.0 ** -PLACES[self.unit]:
@@ -140,9 +138,8 @@ class Versions:
 def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Versions:
     """The versions, compared with another run of the same frames."""
     if current.points.shape != before.points.shape:
-        raise InputError(
-            "--against", f"{before.points.shape[1]} vertices", f"{current.points.shape[1]}, those of the candidate"
-        )
+        got, want = (one.points.shape[1] for one in (before, current))
+        raise InputError("--against", f"{got} vertices", f"{want}, those of the candidate")
     names = {name: one.unit for name, one in before.by_name.items() if name in current.by_name}
     known = {name: before.values(name) for name in names}
     with np.errstate(invalid="ignore", over="ignore"):
@@ -163,9 +160,8 @@ def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versi
 
 def _changes(current: CurrentMeasures, units: dict[str, str], was: dict[str, Floats]) -> tuple[Change, ...]:
     numbers = current.candidate.numbers
-    found = [
-        Change(name, unit, numbers, was[name], current.values(name), current.bars(name)) for name, unit in units.items()
-    ]
+    now, bars = current.values, current.bars
+    found = [Change(name, unit, numbers, was[name], now(name), bars(name)) for name, unit in units.items()]
     return tuple(sorted(found, key=lambda one: (ORDER.index(one.word), -np.nan_to_num(one.size), one.name)))
 
 

@@ -97,9 +97,7 @@ def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
 
 
 def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
-    """The ``points`` (n, 3) [mm] of a closed outward surface of ``triangles`` (m, 3), shifted by one distance along their normals
-    until they enclose a ``volume`` [mm3].
-    """
+    """The ``points`` (n, 3) [mm] of a closed outward surface, moved by one distance along their normals to enclose a ``volume``."""
     for _ in range(3):
         across = _around(normals(points[triangles]), triangles, len(points))
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), _TINY)

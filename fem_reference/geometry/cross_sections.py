@@ -90,9 +90,8 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
         return None
     edges, triangles = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     low, high = above[edges].T
-    points = mesh.points[edges[:, 0]] + (low / (low - high))[:, None] * (
-        mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-    )
+    one, other = (mesh.points[ends] for ends in edges.T)
+    points = one + (low / (low - high))[:, None] * (other - one)
     triangles = triangles.reshape(-1, 3)
     turned = np.einsum("ij,ij->i", normals(points[triangles]), rise) < 0
     triangles[turned] = triangles[turned][:, ::-1]
@@ -136,8 +135,9 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
-    one, two = (_flat(section.points[section.rim], normal) for section in (known, other))
-    old, new = (_shares(section.points[section.rim]) for section in (known, other))
+    rims = [section.points[section.rim] for section in (known, other)]
+    one, two = (rim - np.outer(rim @ normal, normal) for rim in rims)
+    old, new = (_shares(rim) for rim in rims)
     begin = _continued(np.zeros(1), turns, old)
     start = _nearest(two, new, _at(begin, old, one)[0])
     at = np.arange(_SAMPLES) / _SAMPLES
@@ -145,10 +145,6 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
     relative = new - start
     place = begin + relative + np.interp(relative, at, ahead, period=1)
     return _continued(place, old, turns) % 1
-
-
-def _flat(points: Floats, normal: Floats) -> Floats:
-    return points - np.outer(points @ normal, normal)
 
 
 def _shares(rim: Floats) -> Floats:

@@ -23,9 +23,8 @@ def knots(points: Floats, exponent: float = 1.0) -> Floats:
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():
-        raise InputError(
-            "curve", f"{len(points)} points, {int((steps == 0).sum())} repeated", "two points or more, all apart"
-        )
+        got = f"{len(points)} points, {int((steps == 0).sum())} repeated"
+        raise InputError("curve", got, "two points or more, all apart")
     ends = np.concatenate([[0.0], np.cumsum(steps**exponent)])
     return np.asarray(ends / ends[-1])
 

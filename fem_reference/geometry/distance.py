@@ -1,4 +1,4 @@
-"""Exact unsigned distance from points to a triangle surface, and winding numbers of closed surfaces."""
+"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and points that are far apart."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -82,9 +82,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive
-    inside another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no
-    normal.
+    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
+    another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
@@ -98,3 +97,13 @@ def outer_windings(surface: Surface) -> Floats:
         return np.full(len(triangles), np.nan)
     outside = corners.sum(axis=1) / 3 + step * across / np.where(sizes > 0, sizes, 1)[:, None]
     return np.where(sizes > 0, np.round(igl.fast_winding_number(points, triangles, outside)), np.nan)
+
+
+def farthest_points(points: Floats, count: int) -> Ints:
+    """The indices (count,) of ``points`` (n, d): the farthest from their mean first, then each the farthest from those before."""
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    away = np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(away)))
+    return np.array(chosen)

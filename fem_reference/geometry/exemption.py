@@ -88,18 +88,14 @@ class Exemption:
         names, shares = different[:, :3].astype(np.int64), different[:, 3:]
         row, column = np.nonzero(names < count)
         carried = csr_array((shares[row, column], (row, names[row, column])), shape=(len(different), count))
-        away, by = self._corners_away()
+        inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
+        away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
+        away = np.where(away > _INWARD / 10 * self.reach, away, 0.0)  # 0 on the attached part
         nearest = np.lexsort((away, at.ravel()))
         nearest = nearest[np.unique(at.ravel()[nearest], return_index=True)[1]]
         single = np.flatnonzero(names[:, 1] == count)
         vertices = single[np.argsort(names[single, 0])]
         return Corners(carried, away[nearest], by[nearest], at.reshape(-1, 3), vertices)
-
-    def _corners_away(self) -> tuple[Floats, Ints]:
-        """The result of ``away`` for each corner of each piece (3 p,), 0 on the attached part."""
-        inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
-        away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
-        return np.where(away > _INWARD / 10 * self.reach, away, 0.0), by
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
@@ -130,9 +126,7 @@ class Exemption:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of a surface with contact, outside its ``exempt`` part: at most ``apart`` [mm] from each other on
-    average, carried by the tetrahedra of a ``mesh``.
-    """
+    """The material points with contact, outside the ``exempt`` part, on average ``apart`` [mm] at most, carried by a ``mesh``."""
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

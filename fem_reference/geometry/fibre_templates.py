@@ -7,16 +7,16 @@ bends. A muscle with several heads is followed along its greatest section only; 
 
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from scipy.signal import savgol_filter
-from scipy.stats import qmc
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, normals
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, normals
 from fem_reference.geometry.cross_sections import CrossSection, carried, cross_section
 from fem_reference.geometry.curves import bezier
+from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import POINTS, FibreField, resample
+from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing lays a parabola
@@ -57,10 +57,9 @@ class Contours:
         """Points (n, 3) on section ``i`` of ``places`` (n, 2) in its square."""
         square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
         triangles = triangles[np.linalg.norm(normals(square[triangles]), axis=1) > _FLAT]
-        _, hit, closest = igl.point_mesh_squared_distance(np.pad(places, ((0, 0), (0, 1))), square, triangles)
-        corners = np.ascontiguousarray(square[triangles[hit]])
-        shares = igl.barycentric_coordinates(closest, *(np.ascontiguousarray(corners[:, k]) for k in range(3)))
-        return np.asarray(np.einsum("nk,nkd->nd", shares, self.sections[i].points[triangles[hit]]))
+        found = distances(np.pad(places, ((0, 0), (0, 1))), Surface(square, triangles))
+        corners = self.sections[i].points[triangles[found.triangle]]
+        return np.asarray(np.einsum("nk,nkd->nd", found.barycentric, corners))
 
 
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
@@ -102,7 +101,7 @@ def template(count: int, slope: float) -> Floats:
     """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton): parallel to its third axis, or
     inclined to the first axis by the ``slope`` and cut off at the cube's sides.
     """
-    across = qmc.Halton(2, scramble=False).random(count + 1)[1:]
+    across = halton(count, 2)
     margin = _SHORTEST * min(slope, 1.0)
     at = margin - slope + across[:, 0] * (1 + slope - 2 * margin)
     low = np.maximum(0, -at / slope) if slope > 0 else np.zeros(count)
@@ -118,8 +117,9 @@ def mapped(field: FibreField, found: Contours, count: int, pennation: float = 0.
     samples = [_samples(ends, found.heights) for ends in curves]
     placed = np.split(found.place(np.concatenate(samples)), np.cumsum([len(one) for one in samples])[:-1])
     firsts, lasts = (np.array([line[end] for line in placed]) for end in (0, -1))
-    firsts = np.where(curves[:, 0, 2:] == 0, _closest(field, firsts, field.start), firsts)
-    lasts = np.where(curves[:, 1, 2:] == 1, _closest(field, lasts, field.end), lasts)
+    start, end = (Surface(field.mesh.points, facets) for facets in (field.start, field.end))
+    firsts = np.where(curves[:, 0, 2:] == 0, distances(firsts, start).closest, firsts)
+    lasts = np.where(curves[:, 1, 2:] == 1, distances(lasts, end).closest, lasts)
     lines = [
         _smooth(resample(np.concatenate([first[None], line[1:-1], last[None]])))
         for first, line, last in zip(firsts, placed, lasts, strict=True)
@@ -132,10 +132,6 @@ def _samples(ends: Floats, heights: Floats) -> Floats:
     low, high = ends[:, 2]
     between = heights[(heights > low + 1e-6) & (heights < high - 1e-6)]
     return bezier(ends)((np.concatenate([[low], between, [high]]) - low) / (high - low))
-
-
-def _closest(field: FibreField, points: Floats, facets: Ints) -> Floats:
-    return np.asarray(igl.point_mesh_squared_distance(points, field.mesh.points, facets)[2])
 
 
 def _smooth(line: Floats) -> Floats:

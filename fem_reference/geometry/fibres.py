@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 import skfem
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
@@ -86,7 +85,7 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
     values[np.intersect1d(zeros, ones)] = 0.5
     basis = skfem.Basis(skfem.MeshTet(mesh.points.T.copy(), mesh.tets.T.copy()), skfem.ElementTetP1())
     values = skfem.solve(*skfem.condense(laplace.assemble(basis), x=values, D=np.union1d(zeros, ones)))
-    return FibreField(mesh, values, _gradients(mesh, values), mesh.facets[start], mesh.facets[end])
+    return FibreField(mesh, values, averaged(mesh, _slopes(mesh, values)), mesh.facets[start], mesh.facets[end])
 
 
 def trace(field: FibreField, count: int) -> Polylines:
@@ -98,7 +97,7 @@ def trace(field: FibreField, count: int) -> Polylines:
     if len(seeds) == 0:
         got = "nothing between the two attachments"
         raise InputError("fibres.traced", got, "two attachments with muscle between them")
-    seeds = _spread(seeds, 4 * count)
+    seeds = spread(seeds, 4 * count)
     back, came_back = _follow(field, seeds, field.start, -1.0)
     ahead, came_ahead = _follow(field, seeds, field.end, 1.0)
     whole = np.flatnonzero(came_back & came_ahead)[:count]
@@ -134,11 +133,15 @@ class NearestLine:
         return middles, (along / np.maximum(lengths, np.finfo(float).tiny)[:, None])[lengths > 0]
 
 
-def _gradients(mesh: TetMesh, values: Floats) -> Floats:
-    """Gradient (n, 3) at each point: that of the tets around it, averaged by volume."""
+def _slopes(mesh: TetMesh, values: Floats) -> Floats:
+    """The gradient (k, 3) in each tet of ``values`` (n,) at the points."""
     corners = mesh.points[mesh.tets]
     rises = values[mesh.tets[:, 1:]] - values[mesh.tets[:, :1]]
-    slopes = np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0]
+    return np.asarray(np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0])
+
+
+def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
+    """Vectors (n, 3) at the points of a ``mesh``: those of the tets around each, ``slopes`` (k, 3), averaged by volume."""
     volumes = np.repeat(tet_volumes(mesh.points, mesh.tets), 4)
     share = np.bincount(mesh.tets.ravel(), weights=volumes, minlength=len(mesh.points))
     weighted = (volumes * np.repeat(slope, 4) for slope in slopes.T)
@@ -166,8 +169,8 @@ def _seeds(field: FibreField) -> Floats:
     return np.asarray(seeds[depths > enough])
 
 
-def _spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, 3), the most central first, then each the farthest from those before it."""
+def spread(points: Floats, count: int) -> Floats:
+    """At most ``count`` of ``points`` (k, d), the most central first, then each the farthest from those before it."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
@@ -199,9 +202,9 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
         if len(going) == 0:
             break
     lasts = np.array([line[-1] for line in lines])
-    square, _, closest = igl.point_mesh_squared_distance(lasts, field.mesh.points, goal)
-    whole = [np.array([*line, point]) for line, point in zip(lines, closest, strict=True)]
-    return whole, np.sqrt(square) <= field.size / 2
+    ends = distances(lasts, Surface(field.mesh.points, goal))
+    whole = [np.array([*line, point]) for line, point in zip(lines, ends.closest, strict=True)]
+    return whole, ends.distance <= field.size / 2
 
 
 def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:

@@ -64,9 +64,7 @@ FURTHEST = 1e50
 
 
 def check(mesh: FieldMesh) -> FieldMesh:
-    """``mesh`` itself; InputError where a number is not finite, a vertex index is invalid, a vertex is in no cell, a cell is
-    flat, or three triangles share an edge.
-    """
+    """``mesh`` itself; InputError for non-finite numbers, wrong indices, unused vertices, flat cells, edges of three triangles."""
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is no finite number", "finite coordinates")
@@ -128,9 +126,7 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Every interval cut in two, every triangle in four, at the middles of the edges; vertex i stays vertex i, edge j becomes
-    vertex n + j.
-    """
+    """Intervals cut in two, triangles in four at the middles of edges; vertex i stays vertex i, edge j becomes vertex n + j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T
@@ -185,9 +181,9 @@ def nodes(mesh: FieldMesh, order: int) -> Ints:
 
 
 def functions(barycentric: Floats, order: int) -> Floats:
-    """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`: ``L_i``, or
-    ``L_i (2 L_i - 1)`` at corners and ``4 L_i L_j`` between two (Zienkiewicz and Taylor
-    2000, The Finite Element Method, vol. 1, 8.8).
+    """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`.
+
+    Order 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor, The Finite Element Method, 8.8).
     """
     if order == 1:
         return barycentric

@@ -10,7 +10,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import logsumexp
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
+from fem_reference.geometry.distance import farthest_points
 
 # Points inside the surface from which the first centres are made, and vertices that the fit looks at.
 _INSIDE, _SAMPLES = 20_000, 1500
@@ -34,9 +35,7 @@ class GaussianSurface:
     radii: Floats
 
     def level(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """The logarithm of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; and the share (n, m)
-        of each Gaussian in the sum.
-        """
+        """Log of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; shares (n, m) of the Gaussians."""
         exponents = -cdist(points, self.centres, "sqeuclidean") / self.radii**2
         level = logsumexp(exponents, axis=1)
         shares = np.exp(exponents - level[:, None])
@@ -44,9 +43,7 @@ class GaussianSurface:
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
 
     def project(self, points: Floats, levels: Floats | float = 0.0) -> Floats:
-        """``points`` (n, 3) moved along the gradient to where the level is ``levels`` (n,), by Newton's method; each step is at
-        most the least radius.
-        """
+        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton's method, each step at most the least radius."""
         longest = float(self.radii.min())
         for _ in range(_PROJECTIONS):
             level, gradient, _ = self.level(points)
@@ -81,9 +78,8 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
     samples, distances = _samples(surface)
     unknowns = np.concatenate([centres.ravel(), np.log(1.2 * np.sqrt(spread))])
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    within = tuple(
-        np.concatenate([np.tile(box, count), np.full(count, end)]) for box, end in zip((low, high), bounds, strict=True)
-    )
+    boxes = zip((low, high), bounds, strict=True)
+    within = tuple(np.concatenate([np.tile(box, count), np.full(count, end)]) for box, end in boxes)
     for _ in range(_ROUNDS):
         slopes = np.linalg.norm(_surface(unknowns).level(samples)[1], axis=1)
         lengths = 1 / np.maximum(slopes, np.quantile(slopes, 0.05))
@@ -98,16 +94,6 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
             max_nfev=_STEPS,
         ).x
     return _surface(unknowns)
-
-
-def farthest_points(points: Floats, count: int) -> Ints:
-    """The indices (count,) of ``points`` (n, d): the farthest from their mean first, then each the farthest from those before."""
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    away = np.full(len(points), np.inf)
-    while len(chosen) < min(count, len(points)):
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
-        chosen.append(int(np.argmax(away)))
-    return np.array(chosen)
 
 
 def _surface(unknowns: Floats) -> GaussianSurface:

@@ -16,8 +16,7 @@ def self_intersections(surface: Surface) -> Ints:
 def self_crossings(surface: Surface) -> Ints:
     """Pairs (k, 2) of triangles where an edge of one pierces the other.
 
-    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap
-    in one plane.
+    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap in one plane.
     """
     _, pairs, _ = predicates.find_self_intersections(np.array(surface.points), np.array(surface.triangles))
     first, second = pairs.T
@@ -62,14 +61,10 @@ def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_
     begin, end = (surface.points[edges[apart, side]] for side in range(2))
     a, b, c = (surface.points[triangles[apart, corner]] for corner in range(3))
     normal = normals(surface.points[triangles[apart]])
-    crosses = _dot(normal, begin - a) * _dot(normal, end - a) < 0
+    crosses = np.vecdot(normal, begin - a) * np.vecdot(normal, end - a) < 0
     direction = end - begin
-    turns = np.stack([_dot(direction, np.cross(p - begin, q - begin)) for p, q in ((a, b), (b, c), (c, a))])
+    turns = np.stack([np.vecdot(direction, np.cross(p - begin, q - begin)) for p, q in ((a, b), (b, c), (c, a))])
     inside = (turns >= 0).all(axis=0) | (turns <= 0).all(axis=0)
     result = np.zeros(len(edges), bool)
     result[apart] = crosses & inside
     return result
-
-
-def _dot(left: Floats, right: Floats) -> Floats:
-    return np.asarray(np.einsum("ij,ij->i", left, right))

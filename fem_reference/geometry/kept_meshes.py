@@ -1,7 +1,6 @@
 """Tetrahedra and other arrays stored on disk, as they take long to make: written atomically, made anew where damaged."""
 
 import logging
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
 from fem_reference.foundations.version import versions
+from fem_reference.io import files
 
 log = logging.getLogger(__name__)
 
@@ -24,8 +24,7 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
     """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are stored in ``folder``, unless it is None, under a hash of all that they depend on, including this package and those
-    that it imports.
+    They are stored in ``folder``, if any, under a hash of all that they depend on, this package and those it imports included.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -77,9 +76,7 @@ def _write(path: Path, arrays: Arrays) -> None:
     """Store arrays, safely for several processes; warn where they cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
-            part = Path(folder) / path.name
+        with files.whole(path) as part:
             np.savez(part, allow_pickle=False, **arrays)
-            part.replace(path)
     except OSError as why:
         log.warning("%s: not kept: %s", path, why)

@@ -59,9 +59,7 @@ def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) 
 
 
 def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
-    """The ends (e, 2) of the edges, the edges (k, 6) of each tet, and a new point (e, 3) on each edge; ``on_rim`` (n,) masks the
-    points of the mesh on a rim.
-    """
+    """The ends (e, 2) of edges, the edges (k, 6) of each tet, and a new point (e, 3) on each; ``on_rim`` (n,) masks rim points."""
     ends, which = np.unique(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     first, second = on_rim[ends[:, 0]], on_rim[ends[:, 1]]
     at = np.where(first & ~second, GRADED, np.where(second & ~first, 1 - GRADED, 0.5))[:, None]
@@ -100,9 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, those of the boundary moved to the surface, then all by one distance that keeps its volume; less where
-    tets would become invalid.
-    """
+    """The ``points``, those of the boundary moved onto the surface, its volume kept; less far where tets would become invalid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

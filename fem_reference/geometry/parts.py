@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -22,9 +23,7 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """A surface whose triangles each belong to one part: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,)
-    marks the points where parts meet.
-    """
+    """Triangles in parts: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,) marks points where parts meet."""
 
     points: Floats
     triangles: Ints
@@ -50,9 +49,7 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """The parts with well-shaped triangles of about ``size`` [mm], on the ``fine`` surface: short edges at rims collapsed, edges
-    flipped, points slid, those of a rim along it only.
-    """
+    """The parts with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; points of a rim stay on the rim."""
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
         triangles = flip_edges(parts.points, parts.triangles, parts.labels)
@@ -96,7 +93,8 @@ def collapsed(parts: Parts, short: float) -> Parts:
     for one, other in _rim_edges(parts).tolist():
         next_on_rim[one].append(other)
         next_on_rim[other].append(one)
-    around = _around_points(parts.triangles, len(parts.points))
+    faces, starts = igl.vertex_triangle_adjacency(parts.triangles, len(parts.points))
+    around = [some.tolist() for some in np.split(faces, starts[1:-1])]  # the triangles around each point
     target, touched = np.arange(len(parts.points)), np.zeros(len(parts.points), bool)
     gone = np.zeros(len(parts.triangles), bool)
     for i in np.argsort(lengths, kind="stable")[: np.count_nonzero(lengths < short)]:
@@ -119,15 +117,6 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
     return bool(before @ after > _STRAIGHT * np.linalg.norm(before) * np.linalg.norm(after))
-
-
-def _around_points(triangles: Ints, count: int) -> list[list[int]]:
-    """The triangles around each of ``count`` points."""
-    around: list[list[int]] = [[] for _ in range(count)]
-    for i, corners in enumerate(triangles.tolist()):
-        for corner in corners:
-            around[corner].append(i)
-    return around
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import skfem
+from skfem.quadrature import get_quadrature
 
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, TetMesh, corner_areas, tet_volumes
 
@@ -49,7 +51,7 @@ class Displaced:
         if self.by is None:
             return None
         tets, local = self._facets(on)
-        values, slopes, weights = _triangle()
+        values, slopes, weights = _rule(skfem.ElementTriP2())
         nodes = self.nodes[tets[:, None], local]
         places, (one, other) = values @ nodes, (slope @ nodes for slope in slopes)
         areas = weights[:, None] * np.cross(one, other)
@@ -62,7 +64,9 @@ class Displaced:
         if self.by is None or self.velocity is None:
             return None
         sizes = tet_volumes(self.mesh.points, self.mesh.tets)
-        moments = np.cross(_products() @ self.nodes, self.velocity).sum(axis=1)
+        values, _, weights = _rule(skfem.ElementTetP2())
+        products = 6 * (weights * values.T) @ values  # means over a tet of the products of its basis functions
+        moments = np.cross(products @ self.nodes, self.velocity).sum(axis=1)
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
@@ -77,27 +81,12 @@ class Displaced:
         return tets, np.hstack([corners, _MIDDLE[corners, np.roll(corners, -1, axis=1)]])
 
 
-def _triangle() -> tuple[Floats, tuple[Floats, Floats], Floats]:
-    """The six basis functions (q, 6) at quadrature points of a triangle, their two slopes, and weights (q,): exact to degree 4."""
-    ticks, shares = np.polynomial.legendre.leggauss(3)
-    u, v = (axis.ravel() for axis in np.meshgrid((1 + ticks) / 2, (1 + ticks) / 2, indexing="ij"))
-    b, c = u, v * (1 - u)
-    a, zero, one = 1 - b - c, np.zeros_like(b), np.ones_like(b)
-    values = np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=1)
-    along = np.stack([1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c], axis=1)
-    across = np.stack([1 - 4 * a, zero, 4 * c - 1, -4 * b, 4 * b, 4 * (a - c)], axis=1)
-    return values, (along, across), np.outer(shares, shares).ravel() / 4 * (one - u)
-
-
-def _products() -> Floats:
-    """The means (10, 10) over a tet of the products of its basis functions, by quadrature that is exact to degree 4."""
-    ticks, shares = np.polynomial.legendre.leggauss(4)
-    u, v, w = (axis.ravel() for axis in np.meshgrid(*[(1 + ticks) / 2] * 3, indexing="ij"))
-    a, b, c = u, v * (1 - u), w * (1 - u) * (1 - v)
-    corners = np.stack([1 - a - b - c, a, b, c], axis=1)
-    values = np.hstack([corners * (2 * corners - 1), 4 * corners[:, EDGES[:, 0]] * corners[:, EDGES[:, 1]]])
-    weights = np.einsum("i,j,k->ijk", shares, shares, shares).ravel() / 8 * (1 - u) ** 2 * (1 - v) * 6
-    return np.asarray((weights * values.T) @ values)
+def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Floats, Floats]:
+    """Basis functions (q, n) and their slopes (d, q, n) at the points of a rule that is exact to degree 4, and its weights (q,)."""
+    points, weights = get_quadrature(element, 4)
+    nodes = range(6) if element.dim == 2 else (0, 1, 2, 3, 4, 6, 5, 7, 8, 9)  # scikit-fem has edge 12 before edge 02
+    values, slopes = zip(*(element.lbasis(points, i) for i in nodes), strict=True)
+    return np.stack(values, axis=-1), np.stack(slopes, axis=-1), weights
 
 
 def quadratic(nodal: Floats) -> Floats:

@@ -102,16 +102,23 @@ class Sphere(Exact):
 
 
 @dataclass(frozen=True)
-class Capsule(Exact):
-    """The points within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
+class _Rod(Exact):
+    """A body about the segment from ``start`` to ``end`` [mm], of a ``radius`` [mm]."""
 
     start: Vector
     end: Vector
     radius: float
 
     def __post_init__(self) -> None:
-        _check_length("capsule: radius", self.radius)
-        _check_axis("capsule: end", self.start, self.end)
+        kind = type(self).__name__.lower()
+        _check_length(f"{kind}: radius", self.radius)
+        if not np.linalg.norm(np.subtract(self.end, self.start)) > 0:
+            raise InputError(f"{kind}: end", self.end, "another point than the start")
+
+
+@dataclass(frozen=True)
+class Capsule(_Rod):
+    """The points within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
 
     @property
     def half_thickness(self) -> float:
@@ -158,16 +165,8 @@ class Box(Exact):
 
 
 @dataclass(frozen=True)
-class Cylinder(Exact):
+class Cylinder(_Rod):
     """A cylinder of ``radius`` [mm] about the segment from ``start`` to ``end`` [mm], with flat ends and sharp rims."""
-
-    start: Vector
-    end: Vector
-    radius: float
-
-    def __post_init__(self) -> None:
-        _check_length("cylinder: radius", self.radius)
-        _check_axis("cylinder: end", self.start, self.end)
 
     @property
     def half_thickness(self) -> float:
@@ -233,8 +232,3 @@ def _axis(start: Vector, end: Vector) -> tuple[NDArray[np.float64], float]:
 def _check_length(place: str, length: float) -> None:
     if not 0 < length < np.inf:
         raise InputError(place, length, "a length above 0 mm")
-
-
-def _check_axis(place: str, start: Vector, end: Vector) -> None:
-    if not np.linalg.norm(np.subtract(end, start)) > 0:
-        raise InputError(place, end, "another point than the start")

@@ -122,14 +122,15 @@ def _weights(within: Floats) -> Floats:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within
-    ``margin`` [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in
-    ``check_closed``.
+    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
+    [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in ``check_closed``.
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian mean of the distance, as contact does not slide smoothly along
     flat triangles; where the surface has a mean curvature of 1/r, it moves inward by s^2/r. It counts as error.
     """
-    surface = _oriented(surface)
+    check_finite(surface)
+    outward, _ = igl.bfs_orient(surface.triangles)
+    surface = check_closed(Surface(surface.points, outward, surface.place))
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
     if rounding > 0:
@@ -158,9 +159,7 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` with the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that it depends on,
-    including this file.
-    """
+    """The grid of :func:`build` at the spacing of :func:`resolve`, kept in ``folder`` under a hash of all that it depends on."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 
@@ -174,13 +173,6 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
 def _grid(arrays: dict[str, Any]) -> Grid:
     numbers = (float(arrays[name]) for name in ("spacing", "margin", "error", "mean_error"))
     return Grid(arrays["coefficients"], tuple(arrays["origin"].tolist()), *numbers)
-
-
-def _oriented(surface: Surface) -> Surface:
-    """A closed surface whose triangles are all oriented outward."""
-    check_finite(surface)
-    triangles, _ = igl.bfs_orient(surface.triangles)
-    return check_closed(Surface(surface.points, triangles, surface.place))
 
 
 def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tuple[int, ...]]:

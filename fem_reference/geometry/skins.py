@@ -41,9 +41,8 @@ def spacing(surface: Surface) -> float:
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of the attached part of a ``surface`` of m triangles, on average at most ``apart`` [mm] from each
-    other, carried by the tetrahedra of a ``mesh``. Their areas are weighted by the attached ``shares`` (m, 3) of corners, linear
-    in between.
+    """The material points of the attached part of a ``surface``, on average at most ``apart`` [mm] from each other, carried by a
+    ``mesh``. Their areas are weighted by the attached ``shares`` (m, 3) of the corners of its m triangles, linear in between.
     """
     pieces, corners = Pieces.whole(np.flatnonzero(shares.any(axis=1))), surface.points[surface.triangles]
     while len(pieces.parents) and edge_lengths(pieces.of(corners)).mean() > apart:
@@ -52,9 +51,8 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Three points (3 k, 3) [mm] inside each triangle of ``corners`` (k, 3, 3), a rule that is exact for squares and has no
-    points on sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares``
-    (k, 3).
+    """Three points (3 k, 3) [mm] inside each triangle of ``corners`` (k, 3, 3), a rule that is exact for squares and has no points
+    on sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas

@@ -1,7 +1,6 @@
 """Filling of a closed surface with tetrahedra of high quality: the mesh does not keep the vertices of a finer surface.
 
-``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a subprocess, where it may crash, hang or
-keep its global state.
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher, which may crash, hang or keep global state.
 """
 
 import logging
@@ -10,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -48,10 +46,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
     by attachment, whose ``shares`` (m, 3) state how much of the corners of triangles is attached; their ``maker`` says who made
     them. InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that
-    does not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it
-    moves with the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue
-    72).
+    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that does
+    not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it moves with
+    the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -80,8 +77,7 @@ def check_size(surface: Surface, size: float) -> None:
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
     """Origin (3,) and axes in columns (3, 3) of the frame that the points span.
 
-    From point 0 to the point farthest from it, and from that line to the point farthest from it; the lowest index where
-    several are equally far.
+    From point 0 to the point farthest from it, and from that line to the farthest from it; of equally far ones to the first.
     """
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]
@@ -114,9 +110,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
 
 
 def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
-    """The triangles of ``coarse`` with each label, by name; empty where it has no rims or the mesh does not begin with its
-    points.
-    """
+    """The triangles of ``coarse`` with each label, by name; empty without rims, or if the mesh does not begin with its points."""
     count = len(coarse.points)
     if not labels.any() or not np.array_equal(mesh.points[:count], coarse.points):
         return {}
@@ -255,12 +249,8 @@ def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints
     )
 
 
-def _work(job: Path, result: Path) -> None:
-    with np.load(job, allow_pickle=False) as given:
+if __name__ == "__main__":
+    with np.load(sys.argv[1], allow_pickle=False) as given:
         mesher = {"gmsh": _gmsh, "tetwild": _tetwild}[str(given["mesher"])]
         points, tets = mesher(given["points"], given["triangles"], float(given["size"]))
-    np.savez(result, points=points, tets=tets)
-
-
-if __name__ == "__main__":
-    _work(Path(sys.argv[1]), Path(sys.argv[2]))
+    np.savez(sys.argv[2], points=points, tets=tets)

@@ -196,9 +196,8 @@ def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
         along.append(fine[rows, np.minimum(first + 1, fine.shape[1] - 1)] - fine[rows, np.maximum(first - 1, 0)])
         travelled = np.cumsum(np.linalg.norm(np.diff(fine, axis=1, prepend=fine[:, :1]), axis=2), axis=1)
         sizes.append(travelled[rows, last] - travelled[rows, first])
-    pieces = _Pieces(
-        [one for _, one in met], fine[:, 0], fine[:, -1], np.array(points), np.array(along), np.array(sizes)
-    )
+    found = (np.array(values) for values in (points, along, sizes))
+    pieces = _Pieces([one for _, one in met], fine[:, 0], fine[:, -1], *found)
     return pieces.moved(np.zeros((len(fine), 4 * len(met))))  # onto the surfaces
 
 

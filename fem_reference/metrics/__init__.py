@@ -18,6 +18,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
+from fem_reference.problems.fibre_ends import FibreEnds, attached_ends
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.setup import Bone, Joint, Setup
 from fem_reference.runs.store import Run
@@ -117,7 +118,8 @@ class Worst:
 class MeasurementContext:
     """The common context of all measurements of a case: ``areas`` (n,) [mm2] around the surface's vertices at rest, the ``fibres``
     at rest, the ``extension`` of a surface's displacement to their points, ``travel`` [mm], the greatest displacement of the
-    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, and the ``joints``.
+    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, the ``joints``, and the
+    ``ends`` of the fibres, None without attachments.
     """
 
     areas: Floats
@@ -127,6 +129,7 @@ class MeasurementContext:
     bones: tuple[Bone, ...]
     exempt: Exemption
     joints: tuple[Joint, ...] = ()
+    ends: FibreEnds | None = None
 
     @classmethod
     def of(
@@ -165,18 +168,16 @@ def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
 @overload
 def context_of(setup: CaseSetup, reference: Run) -> Context: ...
 def context_of(setup: CaseSetup, reference: Run) -> Context:
-    """The :data:`Context` of the runs of a case from its ``setup`` and ``reference``; InputError where the reference of a muscle
-    lacks its surface or its fibres.
-    """
+    """The :data:`Context` of a case's runs; InputError where the ``reference`` of a muscle lacks its surface or its fibres."""
     if "field" in reference.carries:
         return FieldContext(setup.exact)
     if not reference.has_surface:
         raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
     if reference.fibres is None:
-        raise InputError(
-            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
-        )
-    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
+        place = f"{reference.name}: fibres"
+        raise InputError(place, "a run without an interior", "a reference that carries the fibres")
+    context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
+    return replace(context, ends=attached_ends(setup.attached, context.exempt, reference.fibres))
 
 
 class Metric(Protocol):
@@ -241,9 +242,7 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from the ``values`` (f,) by statistic; all are worst at the places ``where`` (f,), in
-    words, or at no particular place.
-    """
+    """The measures of the metric ``name`` from ``values`` (f,) by statistic, all worst at the places ``where`` (f,), if any."""
     stated = metric(name).STATISTICS
     return tuple(
         Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()
@@ -269,6 +268,11 @@ def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None =
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
+
+
+def as_surface(run: Run) -> Run:
+    """The run without an interior: its surface carries the fibres that are measured, as that of a candidate does."""
+    return replace(run, fibres=None, fibre_positions=None)
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:

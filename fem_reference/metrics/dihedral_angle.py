@@ -11,11 +11,10 @@ from fem_reference.metrics import Measure, MeasurementContext, Statistic
 from fem_reference.metrics.edge_extension import over_edges
 from fem_reference.runs.store import Run
 
+_CURVE = "Bending at the edges from rest, mean magnitude by area"
 STATISTICS = {
     "mean": Statistic("deg"),
-    "mean_magnitude": Statistic(
-        "deg", curve="Bending at the edges from rest, mean magnitude by area", shown={"curve": 40}
-    ),
+    "mean_magnitude": Statistic("deg", curve=_CURVE, shown={"curve": 40}),
     "rms": Statistic("deg"),
     "p95": Statistic("deg"),
     "max": Statistic("deg", local=True),

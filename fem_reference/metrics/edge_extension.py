@@ -35,9 +35,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` of ``deviations`` (f, e) by edge, and ``more`` (f,); all are worst at the edge of the
-    greatest magnitude, at its place in the reference.
-    """
+    """The measures ``name`` of ``deviations`` (f, e) by edge, and ``more`` (f,), worst at the edge of the greatest magnitude."""
     size = np.abs(deviations)
     values = {
         "mean": deviations @ edges.areas / edges.areas.sum(),

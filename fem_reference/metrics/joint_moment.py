@@ -7,6 +7,8 @@ action pull at their ends, via-points and obstacles; without ``hill``, and of mo
 The arm is not that of the fibres' excursion: a matrix that is bent bears a moment with little force (docs/measures.md).
 """
 
+from functools import partial
+
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
@@ -15,6 +17,7 @@ from fem_reference.metrics.moment_arm import turning
 from fem_reference.problems.setup import Joint
 from fem_reference.runs.store import Run
 
+_of_one = partial(Statistic, local=True, lone=True)
 STATISTICS = {
     "moment": Statistic(
         "N mm",
@@ -23,23 +26,11 @@ STATISTICS = {
         curve="Moment of the muscle about the joint",
         shown={"curve": 26, "angle": 26, "rank": 50},
     ),
-    "force": Statistic(
-        "N",
-        "Joint",
-        "force",
-        curve="Force of the muscle on the bone of the joint",
-        shown={"curve": 27, "angle": 27},
-        local=True,
-        lone=True,
+    "force": _of_one(
+        "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
     ),
-    "arm": Statistic(
-        "mm",
-        "Joint",
-        "arm by force",
-        curve="Moment arm by force: moment over force",
-        shown={"curve": 28, "angle": 28},
-        local=True,
-        lone=True,
+    "arm": _of_one(
+        "mm", "Joint", "arm by force", curve="Moment arm by force: moment over force", shown={"curve": 28, "angle": 28}
     ),
 }
 OF, AGAINST = "lines", "reference"

@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.exemption import Exemption
-from fem_reference.geometry.overlap import shared
+from fem_reference.geometry.penetrations import shared
 from fem_reference.geometry.skins import edge_lengths
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.problems.setup import Bone

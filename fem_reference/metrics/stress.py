@@ -4,36 +4,24 @@ Along the fibres as they are, by von Mises, and the pressure, above 0 in compres
 greatest stress, at the rim of an attachment, grows without bound as these get smaller. Of runs without stresses there is none.
 """
 
+from functools import partial
+
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.runs.store import Run
 
-_TITLE = "Stress"
+_of_field = partial(Statistic, "kPa", "Stress", local=True, pooled=True)
 STATISTICS = {
-    "along_fibres_mean": Statistic(
-        *("kPa", _TITLE, "along fibres, mean"),
-        curve="Stress along the fibres, mean over the volume",
-        shown={"curve": 32},
-        local=True,
-        pooled=True,
+    "along_fibres_mean": _of_field(
+        "along fibres, mean", curve="Stress along the fibres, mean over the volume", shown={"curve": 32}
     ),
-    "along_fibres_p95": Statistic("kPa", _TITLE, "along fibres, 95 % below", local=True, pooled=True),
-    "von_mises_mean": Statistic("kPa", _TITLE, "von Mises, mean", local=True, pooled=True),
-    "von_mises_p95": Statistic(
-        *("kPa", _TITLE, "von Mises, 95 % below"),
-        curve="Von Mises stress, which 95 % of the volume do not exceed",
-        shown={"curve": 33},
-        local=True,
-        pooled=True,
+    "along_fibres_p95": _of_field("along fibres, 95 % below"),
+    "von_mises_mean": _of_field("von Mises, mean"),
+    "von_mises_p95": _of_field(
+        "von Mises, 95 % below", curve="Von Mises stress, which 95 % of the volume do not exceed", shown={"curve": 33}
     ),
-    "pressure_mean": Statistic(
-        *("kPa", _TITLE, "pressure, mean"),
-        curve="Pressure, mean over the volume",
-        shown={"curve": 34},
-        local=True,
-        pooled=True,
-    ),
-    "pressure_p05": Statistic("kPa", _TITLE, "pressure, 5 % below", local=True, pooled=True),
-    "pressure_p95": Statistic("kPa", _TITLE, "pressure, 95 % below", local=True, pooled=True),
+    "pressure_mean": _of_field("pressure, mean", curve="Pressure, mean over the volume", shown={"curve": 34}),
+    "pressure_p05": _of_field("pressure, 5 % below"),
+    "pressure_p95": _of_field("pressure, 95 % below"),
 }
 OF, AGAINST = "surface", "reference"
 _KILO = 1000.0  # kPa in a MPa

@@ -10,12 +10,14 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.foundations.records import join
+from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibre_templates import contours, mapped
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
-from fem_reference.geometry.patches import draped, fan
+from fem_reference.geometry.flux_fibres import area_flux, streamlines
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.geometry.skins import edge_lengths
 from fem_reference.geometry.surface_fibres import between
 from fem_reference.io import files
 from fem_reference.scenes.fibres import PolylineFile
@@ -23,6 +25,10 @@ from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
+# The most triangles of a draped patch: those of a patch of some metres.
+_MOST_TRIANGLES = 2**20
+# The longest side [mm] of the triangles of a draped patch.
+_SIDE = 2.0
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
@@ -41,6 +47,19 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
     path = case.file(outline.file, f"{key}.outline.file")
     patches = draped(_patches(path, outline, join(case.place, f"{key}.outline.clouds")), bone_surface)
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
+
+
+def tendon_of(case: MuscleCase, i: int) -> Floats | None:
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None where it has none."""
+    if (tendon := case.attachment[i].tendon) is None:
+        return None
+    key = f"attachment[{i}].tendon"
+    path = case.file(tendon.file, f"{key}.file")
+    clouds = _clouds(path, tendon.unit)
+    if tendon.cloud not in clouds:
+        want = f"one of {', '.join(sorted(clouds))}"
+        raise InputError(join(case.place, f"{key}.cloud"), f'"{tendon.cloud}", which {path} does not have', want)
+    return np.array(clouds[tendon.cloud]).mean(axis=0)
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
@@ -101,6 +120,36 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
     return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
 
 
+def draped(patches: Surface, bone_surface: Surface) -> Surface:
+    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the bone.
+
+    Landmarks lie on the bone, but the triangles between them do not in a hollow: over the iliac fossa they are 13 mm off, more
+    than the thickness of the muscle there.
+    """
+    longest = _longest_side(patches)
+    if len(patches.triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
+        got = f"landmarks {longest:.4g} mm apart"
+        raise InputError(patches.place, got, "those around one attachment, in the unit stated")
+    while _longest_side(patches) > _SIDE:
+        patches = resampled(patches, 1)
+    return patches.moved_to(distances(patches.points, bone_surface).closest)
+
+
+@np.errstate(over="ignore")  # squares overflow for a point that is infinitely far away
+def _longest_side(surface: Surface) -> float:
+    return float(edge_lengths(surface.points[surface.triangles]).max())
+
+
+def fan(points: Floats) -> Surface:
+    """Triangles from the centroid of ``points`` (n, 3) to each two successive ones by angle in their best-fit plane."""
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre)
+    x, y, _ = axes @ (points - centre).T
+    ring = np.argsort(np.arctan2(y, x), kind="stable")
+    triangles = np.stack([np.full(len(ring), len(points)), ring, np.roll(ring, -1)], axis=1)
+    return Surface(np.concatenate([points, centre[None]]), triangles)
+
+
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
     """Landmarks [mm] by cloud, from rows ``cloud,landmark,x,y,z`` below a header row."""
     clouds: dict[str, list[list[float]]] = {}
@@ -130,14 +179,18 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case as their source has them, in part outside the ``surface``, and their direction at any point: that of
-    the nearest, or of a Laplace field. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
+    the nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
-    field = fibre_field(mesh, *case.fibres.ends.values())
-    if (traced := case.fibres.traced) is not None:
+    traced, ends = case.fibres.traced, case.fibres.ends.values()
+    if traced is not None and traced.flux == "area":
+        flux = area_flux(mesh, *ends)
+        return streamlines(flux, traced.count), flux.field
+    field = fibre_field(mesh, *ends)
+    if traced is not None:
         return trace(field, traced.count), field
     asked = case.fibres.kohout_kukacka
     assert asked is not None  # a Fibres record has one source
@@ -180,7 +233,6 @@ def inside(surface: Surface, fibres: Polylines) -> Polylines:
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest
     if away.max() > 0:
-        log.info(
-            "fibres: %d of %d points moved into the muscle, by up to %.1f mm", (away > 0).sum(), len(points), away.max()
-        )
+        moved, most = (away > 0).sum(), away.max()
+        log.info("fibres: %d of %d points moved into the muscle, by up to %.1f mm", moved, len(points), most)
     return Polylines(points, fibres.offsets)

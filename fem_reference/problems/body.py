@@ -65,9 +65,8 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects:
-    its displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs
-    it.
+    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
+    displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs it.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -131,9 +130,7 @@ class Prescribed:
     stiffness: float | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """Displacements (n, 3) [mm] that the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the
-        others; InputError where the path gives none.
-        """
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it has none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))

@@ -260,9 +260,8 @@ def _check_start(body: Body) -> None:
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
             place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
-            raise InputError(
-                place, f"displacements up to {off:.4g} mm", "none at the first frame: the body begins at rest"
-            )
+            got = f"displacements up to {off:.4g} mm"
+            raise InputError(place, got, "none at the first frame: the body begins at rest")
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:

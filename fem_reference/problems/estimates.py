@@ -6,15 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.effects import (
-    Effect,
-    Energy,
-    Interaction,
-    Ramped,
-    State,
-    elastic_state,
-    total_energy,
-)
+from fem_reference.effects import Effect, Energy, Interaction, Ramped, State, elastic_state, total_energy
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas

@@ -23,16 +23,13 @@ from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
 
-
 # A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
 CaseSetup = Setup | FieldProblem
 CaseProblem = MuscleProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on whether a case needs each of its effects, and why, from the set-up that ``rest`` gives, by default a new one;
-    empty for a scalar field, which needs all.
-    """
+    """Decisions on which effects a case needs, and why, from the set-up that ``rest`` gives, or a new one; none of a field."""
     if not isinstance(case, MuscleCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -117,9 +114,7 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``
-    with their reasons.
-    """
+    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``."""
     if not isinstance(case, MuscleCase) or case.choice == "listed":
         return case
     found = explained(case, rest)

@@ -35,9 +35,8 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of
-    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its
-    vertices.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
+    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its vertices.
     """
 
     name: str
@@ -51,9 +50,8 @@ class Bone:
     def shape(self) -> Obstacle:
         """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
-        return self.solid or cached(
-            named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, kept_distances()
-        )
+        error, rounding = self.distance_error, self.distance_rounding
+        return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())
 
     def pose(self, frame: float) -> Floats:
         """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
@@ -84,12 +82,15 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
+    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]; ``tendon`` (3,)
+    [mm]: the point of the bone at rest to which fibres go on that end beside them, if any.
+    """
 
     attachment: str
     bone: Bone
     vertices: Ints
     stiffness: float | None = None
+    tendon: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +167,7 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
 
 def _joint(name: str, bone: Bone, motion: RigidMotion, axis: Vector, centre: Vector) -> Joint:
     """The joint of a bone; an ``axis`` against that of its ``motion`` counts the angle the other way."""
-    unit, sign = _unit(axis), float(np.sign(np.dot(axis, motion.axis)))
+    unit, sign = np.array(axis) / np.linalg.norm(axis), float(np.sign(np.dot(axis, motion.axis)))
     return Joint(name, bone, unit, np.array(centre), partial(_angle, motion, sign))
 
 
@@ -175,13 +176,9 @@ def _angle(motion: RigidMotion, sign: float, frame: float) -> float:
 
 
 def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -> None:
-    turns, away = _unit(motion.axis), centre - np.array(motion.centre)
-    if np.linalg.norm(np.cross(_unit(axis), turns)) > _SAME_DIRECTION:
+    turns, away = motion.along, centre - np.array(motion.centre)
+    if np.linalg.norm(np.cross(axis, turns)) > _SAME_DIRECTION * np.linalg.norm(axis):
         want = f"that of the bone's motion, {motion.axis}, or its opposite"
         raise InputError(join(place, "axis"), str(tuple(axis.tolist())), want)
     if (off := float(np.linalg.norm(away - (away @ turns) * turns))) > _SAME_LINE:
         raise InputError(join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "one on it")
-
-
-def _unit(axis: Vector | Floats) -> Floats:
-    return np.asarray(axis, float) / np.linalg.norm(axis)

@@ -1,7 +1,6 @@
 """Structured bodies of the catalogue: smooth maps of unit cubes, cut into cells, straight or curved.
 
-All lengths in mm. A region of the surface lists the corners of its facets in the order of their lattice: of a quadrilateral, 0 and
-3 are opposite.
+All lengths in mm. A region lists the corners of its facets in the order of their lattice: of a quadrilateral, 0 and 3 are opposite.
 """
 
 from collections.abc import Callable, Sequence
@@ -156,9 +155,8 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
-    """Three blocks of an octant around its corner, by their ``place`` from points (n, 3) on the unit cube's outer
-    faces, unit vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the way outward; ``ends``:
-    the faces z0 and z1.
+    """Three blocks of an octant around its corner, by their ``place`` from points (n, 3) on the unit cube's outer faces, unit
+    vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the way outward; ``ends``: the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:

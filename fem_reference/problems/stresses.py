@@ -1,6 +1,4 @@
-"""Stresses in solved states by the energies of effects, differentiated by ``jets``, independently of any solver; and
-those that effects which a case left out would add.
-"""
+"""Stresses in solved states by the energies of effects, independently of any solver; and those of effects left out."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

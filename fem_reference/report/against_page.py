@@ -28,6 +28,7 @@ def page(versions: Versions, setup: Setup) -> Page:
     current = versions.current
     # Of the frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing.
     run, found = current.candidate, versions.place
+    known = [one for one in versions.changes if one.word != "no number"]  # those that changed most first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
     contents = {
         "versions": versions,
@@ -35,7 +36,7 @@ def page(versions: Versions, setup: Setup) -> Page:
         "headline": headline(versions),
         "order": ORDER,
         "sentences": [sentence(one) for word in ORDER[:3] for one in versions.of(word)[:3]],
-        "curves": [_curve(one, i) for i, one in enumerate(_shown(versions))],
+        "curves": [_curve(one, i) for i, one in enumerate(known[:MOST_CURVES])],
         "moved": _moved(versions),
         "place": place(versions),
         "figures": shown[0],
@@ -109,11 +110,6 @@ def text(versions: Versions) -> str:
     moved = place(versions)
     last = f"{versions.current.candidate.name} on {versions.current.scene.name} against {versions.was}: {headline(versions)}"
     return "\n".join([*said, *([f"moved most: {moved}"] if moved else ["nothing moved"]), last])
-
-
-def _shown(versions: Versions) -> list[Change]:
-    """The statistics that are drawn: those that changed most."""
-    return [one for one in versions.changes if one.word != "no number"][:MOST_CURVES]
 
 
 def _curve(one: Change, i: int) -> Drawing:

@@ -1,15 +1,23 @@
-"""Pages requested by a command: their names, which state what makes each different, and the index of pages."""
+"""Pages requested by a command: their names, which state what makes each different, and the index of all pages in a folder."""
 
 import hashlib
+import logging
 import re
 import shlex
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from urllib.parse import quote
 
-from fem_reference.report import index_page, pages
-from fem_reference.report.pages import Page
+from fem_reference.report import pages
+from fem_reference.report.pages import Page, PageHead
+
+log = logging.getLogger(__name__)
 
 LONGEST = 100  # characters of the name of a page
+INDEX = "index"  # the name of its page, and its kind
+# Files below a folder here that are no pages of ours and yet may be looked for.
+_OTHERS = ("report.html", "index.html")
 
 
 @dataclass(frozen=True)
@@ -40,9 +48,8 @@ class Asked:
     def name(self) -> str:
         """The default name."""
         text = "-".join([self.base, *(_plain(part.name) for part in self.parts if part.name)])
-        return (
-            text if len(text) <= LONGEST else f"{text[: LONGEST - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-        )
+        end = f"-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+        return text if len(text) <= LONGEST else text[: LONGEST - len(end)] + end
 
 
 def _plain(text: str) -> str:
@@ -55,9 +62,7 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page into ``folder`` where nothing else is lost, and the index; its path and what is printed. A ``name`` that was
-    given takes the place of the default.
-    """
+    """Write a page, as ``name`` where that is given, and the index, where nothing else is lost; its path and what is printed."""
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
@@ -67,7 +72,56 @@ def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> 
     path = pages.write(page, parent, file, asked.command)
     notes = [note] if note else []
     try:
-        index_page.write(folder)
+        write_index(folder)
     except OSError as error:  # the page is there, and worth more than its index
         notes.append(f"no index: {error}")
     return path, [f"page: {path}", *(f"  {line}" for line in notes)]
+
+
+@dataclass(frozen=True)
+class IndexEntry:
+    """A page: its ``name`` here, its address from here, when it was ``made``, and its ``head``."""
+
+    name: str
+    address: str
+    made: str
+    head: PageHead
+
+
+def write_index(folder: Path) -> None:
+    """Write ``index.html`` of the pages in ``folder``, unless a file of that name exists that is not such an index."""
+    path = folder / f"{INDEX}.html"
+    there = pages.read(path)
+    if path.exists() and (there is None or there.kind != INDEX):
+        log.info("no index: %s is no index of fem_reference, and stays as it is", path)
+        return
+    pages.write(index(*entries_of(folder)), folder, INDEX)
+
+
+def index(entries: list[IndexEntry], others: list[str]) -> Page:
+    """The page of ``entries``, and of the addresses of ``others`` that may be pages."""
+    said = (("", "", f"{len(entries)} pages"),)
+    return Page(INDEX, "Pages", said, "index_page.html", {"entries": entries, "others": others})
+
+
+def entries_of(folder: Path) -> tuple[list[IndexEntry], list[str]]:
+    """The pages in ``folder`` and the folders in it, the newest first, and the addresses of other files that may be pages."""
+    entries, others = [], []
+    for path in sorted({*folder.glob("*.html"), *folder.glob("*/*.html")}):
+        head, address = pages.read(path), path.relative_to(folder).as_posix()
+        if head is None and (path.parent == folder or path.name in _OTHERS):
+            others.append(quote(address))
+        elif head is not None and head.kind != INDEX:
+            name = address.removesuffix(".html").removesuffix("/report")
+            entries.append(IndexEntry(name, quote(address), head.made or _changed(path), head))
+    entries.sort(key=lambda one: (one.made, one.name), reverse=True)
+    return entries, [address for address in others if address != f"{INDEX}.html"]
+
+
+def _changed(path: Path) -> str:
+    """The time when a file was changed last; empty where it was removed since it was listed."""
+    try:
+        seconds = path.stat().st_mtime
+    except OSError:
+        return ""
+    return datetime.fromtimestamp(seconds, UTC).astimezone().strftime("%Y-%m-%d %H:%M")

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment import second_check
+from fem_reference.assessment import experiments, second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
+from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.limits import ENERGY_GAP
-from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.drawings import look_of
-from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.pages import Headlines, Page, by_name
 from fem_reference.report.sections import cost, origin
 from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, spread, summary
 from fem_reference.report.viewer import view
@@ -63,23 +63,18 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "runs": comparison.runs,
         "columns": DEVIATIONS,
         "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
-        "curves": curves,
         "bars": known(comparison),
         "spread": spread(comparison),
         "error": error and error.worst,
+        "model_band": experiments.model_band() if comparison.error_bars and comparison.scene.task == "solve" else (),
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,
-        "label_of": label_of,
         "label": partial(label, comparison.scene, comparison.setup),
         "frame_columns": columns(comparison.scene, comparison.setup),
         "changes": origin.changes(comparison.scene),
-        "seconds_per_frame": seconds_per_frame,
-        "inversion": inversion,
-        "greatest": greatest,
-        "widest": widest,
-        "gap": gap,
         "energy_gap_limit": ENERGY_GAP,
         "second_check": second_check.texts_of,
+        **by_name(curves, label_of, seconds_per_frame, inversion, greatest, widest, gap),
         **cost.facts(comparison),
         **origin.facts(comparison),
     }
@@ -94,11 +89,6 @@ def widest(bar: ErrorBar, measure: Measure | None) -> int:
     return replace(bar, values=np.where(np.isfinite(measure.values), bar.values, -1.0)).widest
 
 
-def greatest(values: Floats) -> float:
-    """The greatest of the ``values`` (f,) that are numbers, NaN where none is finite."""
-    return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
-
-
 def gap(run: Run) -> float:
     """The energy gap that is farthest from 0 [%], NaN if there is none."""
     values = run.scalars["energy_gap"]
@@ -106,9 +96,7 @@ def gap(run: Run) -> float:
 
 
 def headlines(comparison: Comparison) -> Headlines:
-    """The verdict on each candidate, "not judged" where nothing is expected of it, with its greatest deviations; then the
-    reference's own checks and doubts.
-    """
+    """The verdict on each candidate with its greatest deviations; then the reference's own checks and doubts."""
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "

@@ -55,7 +55,9 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
     """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of the joint of index
     ``i``, where it turns alone. None where nothing is known there.
     """
-    context, numbers, found = comparison.context, comparison.reference.numbers, _found(comparison, *key)
+    context, numbers = comparison.context, comparison.reference.numbers
+    measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
+    found = {run: measure for run, measure in measures.items() if measure is not None}
     name, over, along, shown = "-".join(key), "frame", np.asarray(numbers, float), np.ones(len(numbers), bool)
     if i is not None:
         assert isinstance(context, MeasurementContext)  # which has the joints
@@ -65,12 +67,6 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
         found = found if any(np.isfinite(one.values[shown]).any() for one in found.values()) else {}
     draw = partial(_draw_runs, comparison, found, along, shown)
     return over_frames(name, title, next(iter(found.values())).unit, draw, over) if found else None
-
-
-def _found(comparison: Comparison, metric: str, statistic: str) -> dict[str, Measure]:
-    """The measure from rest by name of the run, of those that have it."""
-    measures = {run.name: find(comparison.changes[run.name], metric, statistic) for run in comparison.runs}
-    return {run: measure for run, measure in measures.items() if measure is not None}
 
 
 def _draw_runs(

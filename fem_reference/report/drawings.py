@@ -149,9 +149,7 @@ def plain_numbers(axis: Any) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only, and colours that
-    the page may set by their names.
-    """
+    """The ``<svg>`` alone, as wide as its place: ids begin with ``name``, and the page may set colours by their names."""
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")

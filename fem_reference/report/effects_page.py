@@ -10,7 +10,7 @@ from fem_reference.assessment import omissions
 from fem_reference.assessment.omissions import Ablation, CaseOmissions, Omission
 from fem_reference.metrics import described
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
-from fem_reference.report.pages import Page
+from fem_reference.report.pages import Page, by_name
 from fem_reference.report.study_page import title_of
 from fem_reference.report.words import duration, listed, number, words
 
@@ -30,13 +30,11 @@ def page(found: CaseOmissions) -> Page:
         "phases": phases(found),
         "counts": {name: title_of(name) for name in omissions.COUNTS},
         "predicted": any(one.predicted for ablation in found.ablations for one in ablation.omissions),
-        "sentences": sentences,
-        "label": label,
         "judged": lambda one: omissions.verdict(one.changes, found.bars),
         "prediction": lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
         "instead": lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
-        "percent": percent,
         "drawing": drawing(found),
+        **by_name(sentences, label, percent),
     }
     title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
     return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))
@@ -96,9 +94,8 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
 
 def _most(found: CaseOmissions, one: Omission) -> str:
     """The change that is the most error bars."""
-    ratios = {
-        name: ratio for name, ratio in omissions.in_bars(one.changes, found.bars).items() if not math.isnan(ratio)
-    }
+    in_bars = omissions.in_bars(one.changes, found.bars).items()
+    ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
     known = f", known to {number(found.bars[name])} {found.units[name]}," if name in found.bars else ""
     return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
@@ -133,9 +130,8 @@ def drawing(found: CaseOmissions) -> Drawing | None:
 def _points(ablation: Ablation) -> list[tuple[str, float, float]]:
     """The omissions of a run that can be drawn: the name of each, the time saved [%] and the change of the surface [mm]."""
     shares = ((one, ablation.relative(one.seconds)) for one in ablation.omissions if MAIN in one.changes)
-    return [
-        (label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in shares if not math.isnan(share)
-    ]
+    known = [(one, share) for one, share in shares if not math.isnan(share)]
+    return [(label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in known]
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.curves import TECHNIQUES
 from fem_reference.geometry.gaussian_surface import GaussianSurface
 from fem_reference.io.texts import plain
-from fem_reference.metrics import Statistic, described
+from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
@@ -24,39 +24,27 @@ _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]]
 
 def page(found: Estimation) -> Page:
     """The page of the errors of estimation techniques."""
+    answers = {".".join(key): one for key, one in described().items()}
+    drawings = (_figure(), _curves(found) if found.curves else None, _blobs(), _fits(found) if found.fits else None)
     contents = {
         "found": found,
         "techniques": TECHNIQUES,
-        "answers": _columns(found),
+        "answers": {name: answers[name] for one in found.answers for name in one.changes},
         "fibres": _rows(found.curves, "case", "known"),
         "areas": _rows(found.heights, "case", "attachment", "centres"),
         "choices": dict.fromkeys(one.choice for one in found.heights),
-        "drawings": [
-            _figure(),
-            *([_curves(found)] if found.curves else []),
-            _blobs(),
-            *([_fits(found)] if found.fits else []),
-        ],
+        "drawings": [one for one in drawings if one is not None],
     }
-    return Page(
-        "estimation", "Estimation techniques", (("", "", said(found)),), "estimation_page.html", contents, facts(found)
-    )
-
-
-def _columns(found: Estimation) -> dict[str, Statistic]:
-    """The statistics of answers that are known, by ``metric.statistic``."""
-    names = dict.fromkeys(name for one in found.answers for name in one.changes)
-    return {name: described()[metric, statistic] for name in names for metric, _, statistic in [name.partition(".")]}
+    headlines = (("", "", said(found)),)
+    return Page("estimation", "Estimation techniques", headlines, "estimation_page.html", contents, facts(found))
 
 
 def said(found: Estimation) -> str:
     """The best technique for fibres, and the accuracy of Gaussians, where they were measured."""
     sentences = list[str]()
     if found.curves:  # not where all fibres have few points
-        by_technique = {
-            name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES
-        }
-        best = min(by_technique, key=lambda name: float(by_technique[name]))
+        errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
+        best = min(errors, key=lambda name: float(errors[name]))
         sentences.append(f"of curves through a few points of a fibre {best} deviates least")
     most = max((one.gaussians for one in found.fits), default=0)
     if fits := [one for one in found.fits if one.gaussians == most]:
@@ -115,9 +103,7 @@ def _curves(found: Estimation) -> Drawing:
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """The level of two Gaussians of radius 1 in a plane through both: coordinates along (n,) and across (m,), and the
-    level (m, n), positive inside.
-    """
+    """The level (m, n) of two Gaussians of radius 1, positive inside, in a plane: at coordinates along (n,) and across (m,)."""
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))

@@ -208,9 +208,8 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
         windows.append(_Window("detail about the mean of y", belt.min(axis=0), belt.max(axis=0), 0.2))
     if len(anchors):
         room = np.array([0.06, 0.06, 1.0]) * extent
-        windows.append(
-            _Window("detail about the fixed vertices", anchors.min(axis=0) - room, anchors.max(axis=0) + room, 0.3)
-        )
+        low, high = anchors.min(axis=0) - room, anchors.max(axis=0) + room
+        windows.append(_Window("detail about the fixed vertices", low, high, 0.3))
     return windows
 
 
@@ -222,9 +221,8 @@ def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats,
     side = np.array([-1.0, 1.0, -1.0]) if behind else np.ones(3)
     turned = FieldMesh(mesh.points * side, mesh.cells, mesh.place)
     windows = _windows(turned.points, anchors * side)
-    grid: Any = figure.add_gridspec(
-        1, len(windows), width_ratios=[window.half[0] / window.half[1] for window in windows]
-    )
+    ratios = [window.half[0] / window.half[1] for window in windows]
+    grid: Any = figure.add_gridspec(1, len(windows), width_ratios=ratios)
     for window, place in zip(windows, grid, strict=True):
         axes = figure.add_subplot(place)
         inside = ((turned.points >= window.low) & (turned.points <= window.high)).all(axis=1)
@@ -247,6 +245,5 @@ def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) 
     order = np.argsort(corners[:, :, 2].mean(axis=1))
     # Without an edge of their own colour, the white behind shows between triangles.
     edges: Any = (0, 0, 0, 0.5) if line else faces[order]
-    return PolyCollection(
-        list(corners[order, :, :2]), facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2
-    )
+    shown = list(corners[order, :, :2])
+    return PolyCollection(shown, facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2)

@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.judge import overall
 from fem_reference.report import field_figures
-from fem_reference.report.pages import Page
+from fem_reference.report.pages import Page, by_name
 from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
@@ -21,9 +21,8 @@ def page(title: str, examples: tuple[Comparison, ...]) -> Page:
     """The page of scalar examples with the table of differences between the report's text and listings."""
     words = [one.word for one in examples]
     said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
-    return Page(
-        "examples", title, said, "field_page.html", _contents(examples) | {"differences": _section()["difference"]}
-    )
+    contents = _contents(examples) | {"differences": _section()["difference"]}
+    return Page("examples", title, said, "field_page.html", contents)
 
 
 def comparison_page(example: Comparison) -> Page:
@@ -40,13 +39,7 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
         "word": overall(example.word for example in examples),
         "differences": (),
         "figures_of_report": _section()["figure"],
-        "apart": apart,
-        "bounds": bounds,
-        "seconds": seconds,
-        "pivot": pivot,
-        "form": form,
-        "drawings": field_figures.drawings,
-        "convergence": field_figures.convergence,
+        **by_name(apart, bounds, seconds, pivot, form, field_figures.drawings, field_figures.convergence),
     }
 
 

@@ -70,9 +70,8 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Sh
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:
         return [], str(error)
-    return [
-        replace(shot, sources=tuple(map(picture_source, pair))) for shot, pair in zip(wanted, drawn, strict=True)
-    ], ""
+    pairs = zip(wanted, drawn, strict=True)
+    return [replace(shot, sources=tuple(map(picture_source, pair))) for shot, pair in pairs], ""
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:

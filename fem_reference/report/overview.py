@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from fem_reference.assessment import second_check
@@ -39,8 +38,8 @@ def _what(expected: Expectation) -> str:
     return f"{expected.of} {expected.metric} {expected.statistic} at frame {expected.frame}"
 
 
-def comparison_text(result: Comparison, page: Path | None = None) -> str:
-    """The result of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
+def comparison_text(result: Comparison) -> str:
+    """The result of a comparison, line by line: its runs, its worst numbers and its verdicts."""
     runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in result.runs]
     runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
     checks = second_check.texts_of(result.reference)
@@ -50,8 +49,7 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}
     note = ", of the reference; candidates are measured, not judged" if unjudged else ""
-    written = [] if page is None else [f"page: {page}"]
-    return "\n".join([*runs, *_known(result), *_worst(result), *judged, f"verdict: {result.word}{note}", *written])
+    return "\n".join([*runs, *_known(result), *_worst(result), *judged, f"verdict: {result.word}{note}"])
 
 
 def _judged(verdict: Verdict) -> str:

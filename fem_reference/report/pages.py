@@ -137,6 +137,11 @@ def small_picture(text: str) -> str:
         return ""
 
 
+def by_name(*functions: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
+    """The ``functions`` that a template calls by their own names."""
+    return {one.__name__: one for one in functions}
+
+
 def template(name: str) -> jinja2.Template:
     """The template in the file ``name`` beside this one: its contents are escaped, and a name that it lacks is an error."""
     return _environment().get_template(name)
@@ -152,14 +157,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {
-        "find": find,
-        "greatest_distance": gallery.top,
-        "ramp": gallery.ramp,
-        "ratio": ratio,
-        "ticks": gallery.ticks,
-        "title_of": title_of,
-        "zip": zip,
-    }
-    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words, "listed": listed}
+    environment.globals |= by_name(find, gallery.ramp, gallery.ticks, ratio, title_of, zip)
+    environment.globals["greatest_distance"] = gallery.top
+    environment.filters |= by_name(number, duration, exact, words, listed)
     return environment

@@ -15,10 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from scipy.ndimage import binary_erosion
 
 COLOURS = "viridis"
 SIDE = 840
 _OVERSAMPLING = 2
+# A pixel of a body is on its outline where one of those that are four beside it is not of the body.
+_NEAR = np.logical_and.outer(*[np.isin(np.arange(9), (0, 4, 8))] * 2)
 _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 
 
@@ -66,7 +69,7 @@ def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction
     if outline is not None:
         flat = {"color": "black", "lighting": False}
         body = _render([(_surface(outline, job["triangles"]), flat)], camera)[:, :, 0] < 128
-        picture[_rim(body)] = _LINE
+        picture[body & ~binary_erosion(body, _NEAR)] = _LINE
     return Image.fromarray(picture).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
 
 
@@ -95,14 +98,6 @@ def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) ->
     picture = np.array(plotter.screenshot(return_img=True))
     plotter.close()
     return picture
-
-
-def _rim(body: NDArray[Any]) -> NDArray[Any]:
-    """The pixels of ``body`` (a mask) within four of its edge."""
-    inside = np.pad(body, 4)
-    height, width = body.shape
-    around = [inside[4 + dy : 4 + dy + height, 4 + dx : 4 + dx + width] for dx in (-4, 0, 4) for dy in (-4, 0, 4)]
-    return np.asarray(body & ~np.all(around, axis=0))
 
 
 if __name__ == "__main__":

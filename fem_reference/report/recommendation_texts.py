@@ -24,9 +24,7 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, its error in a ``unit`` and its time, and the cases it was measured on. Where none meets the ``limit`` of the
-    error (infinite without one), the nearest.
-    """
+    """The setting, or the nearest to the ``limit`` of the error: its error in a ``unit``, its time, and where it was measured."""
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()

@@ -89,9 +89,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a headline in Markdown, with the reason ``why`` nothing was judged: older files would
-    mislead.
-    """
+    """A JUnit suite with one error, and a headline in Markdown, that say ``why`` nothing was judged: older files would mislead."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
@@ -148,12 +146,9 @@ def _answers(check: Check) -> list[str]:
 
 
 def _cells(one: Judgement) -> tuple[str, ...]:
-    numbers = (_text(value, one.unit) for value in (one.was, one.current, one.allowed, one.known))
-    return (one.word, one.question, one.name, str(one.frame), *numbers)
-
-
-def _text(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}" if math.isfinite(value) else "none"
+    numbers = (one.was, one.current, one.allowed, one.known)
+    texts = (f"{value:.4g} {one.unit}" if math.isfinite(value) else "none" for value in numbers)
+    return (one.word, one.question, one.name, str(one.frame), *texts)
 
 
 def _escaped(cell: str) -> str:

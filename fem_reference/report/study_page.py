@@ -12,12 +12,12 @@ from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
-from fem_reference.assessment.transfer import transfers
+from fem_reference.assessment.recommendation import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, logarithmic
-from fem_reference.report.pages import Page
+from fem_reference.report.pages import Page, by_name
 from fem_reference.report.words import duration, listed, number
 from fem_reference.report.words import title_of as in_words
 
@@ -34,21 +34,14 @@ def page(study: Study) -> Page:
     cases = [cost_study.facts(case, study.origin) for case in study.cases]
     contents = {
         "study": study,
-        "shown": shown,
         "main": MAIN,
         "costs": COSTS,
-        "solvers": solvers,
-        "front": front,
-        "sentences": sentences,
-        "matched": matched,
-        "left_out": left_out,
-        "title_of": title_of,
-        "as_measured": as_measured,
         "data": json.dumps(_data(study)).replace("<", "\\u003c"),
         "cover": lambda case: Cover.of(case.claims),
         "claims": lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         "transfers": moved,
         "losses": sorted(one.loss for one in moved),
+        **by_name(shown, solvers, front, sentences, matched, left_out, title_of, as_measured),
     }
     one = cases[0] if len(cases) == 1 else None
     said = tuple(("" if one else case.case, "", text) for case in study.cases for text in sentences(case)[-1:])
@@ -192,8 +185,6 @@ def text(study: Study) -> str:
             known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
             lines.append(f"  {title_of(error)}{known}:")
             lines += [f"    {sentence}" for sentence in sentences(case, error)]
-        lines += [
-            f"  left out: {point.solver}, {point.label}: {point.status}: {point.message}" for point in left_out(case)
-        ]
+        lines += [f"  left out: {one.solver}, {one.label}: {one.status}: {one.message}" for one in left_out(case)]
     lines += [f"left out: {case}: {why}" for case, why in study.missing.items()]
     return "\n".join(lines)

@@ -28,16 +28,16 @@ _ROW = 0.175  # height of a row of the overview [in]
 def page(verification: Verification) -> Page:
     """The page of the results of entries."""
     results = verification.results
-    passed = f"{len(results) - len(verification.failed)} of {len(results)} pass"
+    judged = {name: [one for one in group if one in verification.judged] for name, group in verification.groups.items()}
     contents = {
         "verification": verification,
         "kinds": Counter(one.entry.kind for one in results),
         "share": share,
         "spent": duration(math.fsum(one.seconds for one in results)),
-        "overview": overview(verification.groups),
+        "overview": overview(shown) if (shown := {name: group for name, group in judged.items() if group}) else None,
         "ladders": [convergence(one) for one in results if drawable(one)],
     }
-    said = (("", verification.word, passed),)
+    said = (("", verification.word, ", ".join(filter(None, (verification.passed, verification.beside)))),)
     title = "Verification: problems whose answers are known"
     return Page("verification", title, said, "verify_page.html", contents, facts(verification))
 
@@ -48,9 +48,8 @@ def text(verification: Verification) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
     layout = list(zip(sides, widths, strict=True))
-    lines = [
-        "  ".join(f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)) for row in rows
-    ]
+    cells = ([f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)] for row in rows)
+    lines = ["  ".join(row) for row in cells]
     return "\n".join([*(line.rstrip() for line in lines), verification.summary])
 
 
@@ -65,8 +64,9 @@ def facts(verification: Verification) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     return {
         "verdict": verification.word,
-        "passed": len(verification.results) - len(verification.failed),
-        "of": len(verification.results),
+        "passed": sum(one not in verification.failed for one in verification.judged),
+        "of": len(verification.judged),
+        "experiments": verification.beside,
         "seconds": verification.seconds,
         "versions": verification.versions,
         "entries": rows(verification.results),
@@ -106,16 +106,12 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
 
     def draw(figure: Figure, axes: Axes) -> None:
         row = 0
+        side: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "ha": "right", "va": "center"}
         for group, members in groups.items():
-            axes.text(
-                -0.01, row, words(group), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
-            )
+            axes.text(-0.01, row, words(group), weight="bold", **side)
             axes.axhline(row - 0.7, color="#dddddd", linewidth=0.8)
             for place, one in enumerate(members, row + 1):
-                label = axes.text(
-                    -0.01, place, one.entry.name, transform=axes.get_yaxis_transform(), ha="right", va="center"
-                )
-                label.set_color("#1d1d1f" if one.word == "pass" else FAIL)
+                axes.text(-0.01, place, one.entry.name, color="#1d1d1f" if one.word == "pass" else FAIL, **side)
                 _dot(axes, place, one, (low, high))
             row += len(members) + 1
         axes.set_ylim(row - 0.3, -0.7)

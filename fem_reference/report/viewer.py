@@ -34,8 +34,8 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
-from fem_reference.report.viewer_fields import Fields, arrows, at_numbers, joints
-from fem_reference.runs.store import Run
+from fem_reference.report.viewer_fields import Fields, arrows, joints
+from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
 # How many bytes the positions and levels of all frames may have before they are compressed: about as many as base64 needs for what
@@ -127,9 +127,8 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 def _greatest_force(runs: list[dict[str, Any]]) -> float:
     """The greatest magnitude [N] of the arrows of all ``runs``, 0 without any."""
-    return max(
-        (float(np.linalg.norm(one[3:])) for row in runs for frame in row["forces"] for one in frame), default=0.0
-    )
+    forces = (one[3:] for row in runs for frame in row["forces"] for one in frame)
+    return max((float(np.linalg.norm(force)) for force in forces), default=0.0)
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:

@@ -98,9 +98,8 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
         known = ", ".join(key[len(kind) : -2] for key in scalars if key.startswith(kind) and key.endswith("_x"))
-        raise InputError(
-            "bone", f'"{name}"', f"one of {known}" if known else "a run of the reference: no force is known"
-        )
+        want = f"one of {known}" if known else "a run of the reference: no force is known"
+        raise InputError("bone", f'"{name}"', want)
     return np.stack([scalars[key] for key in keys], axis=1)
 
 

@@ -29,9 +29,7 @@ _MADE_WITH = (
 
 
 def key(scene: str, solver: str, settings: Mapping[str, object]) -> str:
-    """A hash of 16 digits over all that determines a run: the key of its ``scene``, the ``solver`` with those ``settings`` that
-    affect its result, and :func:`code_hash`.
-    """
+    """A hash of 16 digits over the key of a ``scene``, the ``solver``, those ``settings`` that matter, and :func:`code_hash`."""
     parts = [scene, solver, json.dumps(settings, sort_keys=True), code_hash(solver)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
@@ -47,9 +45,7 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files of ``package`` that determine the runs of ``solver``: the packages that make problems from scenes, and the
-    solver's modules with all their direct and indirect imports.
-    """
+    """The files that determine the runs of ``solver``: packages that make problems, and its modules with all that they import."""
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
     while waiting:

@@ -58,9 +58,7 @@ class NodalState:
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """Write the rest ``mesh`` of the states of the run in ``folder``, and the unit vectors ``fibre`` (m, 3) in its
-    tetrahedra.
-    """
+    """Write the rest ``mesh`` of the states of the run in ``folder``, and the directions ``fibre`` (m, 3) in its tetrahedra."""
     directions = np.zeros((0, 3)) if fibre is None else fibre
     write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 

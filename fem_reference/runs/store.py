@@ -12,6 +12,7 @@
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -87,12 +88,11 @@ class Outcome:
 class Run:
     """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
 
-    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
-    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
-    only moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead,
-    and ``fields`` by name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a
-    body they are the whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested.
-    ``residuals`` by frame.
+    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
+    [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines only moves no
+    surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
+    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a body they are the
+    whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested. ``residuals`` by frame.
     """
 
     name: str
@@ -258,16 +258,17 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
     return run if run.outcome.status in ended else None
 
 
+def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
+    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN where it has no such frame."""
+    rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
+    return np.stack([rows.get(number, lost) for number in numbers])
+
+
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:
     """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
     if run.numbers == numbers:
         return run
-    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
-
-    def pick(values: Floats) -> Floats:
-        blank = np.full(values.shape[1:], np.nan)
-        return np.stack([blank if row is None else values[row] for row in rows])
-
+    pick = partial(at_numbers, run, numbers=numbers)
     return replace(
         run,
         numbers=numbers,
@@ -289,9 +290,7 @@ def seconds_per_frame(run: Run) -> float | None:
     if run.solver == "recorded":
         each = cost.get("seconds_per_frame")  # per frame number
         return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
-    if seconds is None or solved < 1:
-        return None
-    return seconds / solved
+    return None if seconds is None or solved < 1 else seconds / solved
 
 
 def reached(run: Run) -> int:

@@ -6,11 +6,7 @@ from fem_reference.foundations.mesh import Floats, tet_volumes
 from fem_reference.runs.results import Results
 
 # Statistics by kind of stress. No greatest value: at the rim of an attachment it grows without bound with smaller tetrahedra.
-STATISTICS = {
-    "along_fibres": ("mean", "p95"),
-    "von_mises": ("mean", "p95"),
-    "pressure": ("mean", "p05", "p95"),
-}
+STATISTICS = {"along_fibres": ("mean", "p95"), "von_mises": ("mean", "p95"), "pressure": ("mean", "p05", "p95")}
 _MOST = 8192  # tetrahedra that are looked at, evenly spread
 # Barycentric coordinates of four points, of equal shares of the volume: exact to degree 2 (Hammer and Stroud 1956).
 _NEAR = (5 - 5**0.5) / 20

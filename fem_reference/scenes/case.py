@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -25,7 +25,6 @@ ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
-
 
 # Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
 Standard = Literal["reference", "exact", "itself"]
@@ -153,9 +152,7 @@ class Case(Record):
         return sorted(set(re.findall(r'"data:([^"]+)"', known)))
 
     def file(self, text: str, key: str) -> Path:
-        """The file that a ``key`` names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the folder of
-        the case.
-        """
+        """The file of a ``key``: below the data folder (``data:``), below meshes (``mesh:``), or relative to the case's folder."""
         place = join(self.place, key)
         if text.startswith("data:"):
             root = os.environ.get(DATA_SETTING)
@@ -180,7 +177,7 @@ class Case(Record):
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
         folders = [self.folder, HOME / "meshes", *map(Path, filter(None, settings.split(os.pathsep)))]
-        if not is_inside(path, folders):
+        if not any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
             want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
@@ -216,11 +213,6 @@ def _exists(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long, or with a null character
         return False
-
-
-def is_inside(path: Path, folders: Iterable[Path]) -> bool:
-    """True where ``path``, links followed, is in one of the ``folders``."""
-    return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
 def _unnamed(tables: Any, names: Collection[str]) -> Any:

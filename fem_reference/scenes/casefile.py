@@ -1,6 +1,5 @@
 """case.toml -> Case: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
 
-import re
 from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
@@ -16,6 +15,7 @@ from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
 from fem_reference.io import texts
+from fem_reference.scenes import numbers, ranges
 from fem_reference.scenes.case import HOME, Case
 from fem_reference.scenes.muscle import Frames, MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -67,8 +67,7 @@ def _scene_file(case: str | Path) -> Path:
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
     """Change a key of a scene, or ``add`` one to a table that it has."""
-    parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *parents, last = [int(part) if part.isdecimal() and len(part) < 10 else part for part in parts]
+    *parents, last = numbers.parts(key)
     inside: Any = table
     try:
         for part in parents:
@@ -88,9 +87,8 @@ def _near(table: dict[str, Any], parts: list[str | int]) -> str:
     for i, part in enumerate(parts):
         if isinstance(inside, list) and not (isinstance(part, int) and part < len(inside)):
             key, names = ".".join(map(str, parts[:i])), [isinstance(one, dict) and one.get("name") for one in inside]
-            return "; there are " + ", ".join(
-                f"{key}[{k}]{f' ({name})' if name else ''}" for k, name in enumerate(names)
-            )
+            labels = [f"{key}[{k}]{f' ({name})' if name else ''}" for k, name in enumerate(names)]
+            return f"; there are {', '.join(labels)}"
         if isinstance(inside, dict) and part not in inside:
             return f"; there are {', '.join(inside)}"
         if not isinstance(inside, list | dict):
@@ -178,6 +176,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     if isinstance(case, MuscleCase):
         _check_names(case)
         _check_rest(case)
+        ranges.check(case)
     return case
 
 
@@ -238,9 +237,8 @@ def _check_forces(case: MuscleCase) -> None:
         if contact and attachment.name in bones:
             place = join(case.place, f"attachment[{i}].name")
             raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
-    if not case.attachment and not any(
-        isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects
-    ):
+    stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
+    if not case.attachment and not stays:
         want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
         raise InputError(join(case.place, "attachment"), "none", want)
 

@@ -1,7 +1,7 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
 Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p + 1, 4), unit quaternions (w, x, y, z)
-that take each segment's frame from rest, between those of the two bones. Bones give the ends' points, all others are free.
+that take each segment's frame from rest, between those of the two bones. Bones prescribe the end points, all others are free.
 
 All constraints of a kind are projected at once (Jacobi), each by a share that keeps the sum with its neighbours' steps from
 overshooting. Where constraints contradict each other the limit is the least sum of squares, for any order of points.

@@ -86,9 +86,8 @@ def check_run(given: object, case: Case, place: str) -> None:
         got = f'a run of another case ("{run.origin.get("case", "without a name")}")'
         raise InputError(place, got, f'one of "{case.name}" with all its keys as they are')
     if run.carries.isdisjoint(case.carries):
-        raise InputError(
-            place, f"a run of {', '.join(sorted(run.carries))}", f"one of {', '.join(sorted(case.carries))}"
-        )
+        got, want = (", ".join(sorted(parts)) for parts in (run.carries, case.carries))
+        raise InputError(place, f"a run of {got}", f"one of {want}")
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:

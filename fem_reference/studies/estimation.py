@@ -5,8 +5,7 @@ what the reference answers with each.
 """
 
 import logging
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -29,10 +28,9 @@ from fem_reference.geometry.curves import TECHNIQUES, Curve
 from fem_reference.geometry.fibres import NearestLine
 from fem_reference.geometry.gaussian_surface import fit
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.metrics import context_of
+from fem_reference.metrics import as_surface, context_of
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.setup import Setup
-from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Chmd, Fibres, KohoutKukacka, Traced
 from fem_reference.scenes.muscle import MuscleCase
@@ -65,9 +63,7 @@ _OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
-    """All techniques on all cases; with a ``store`` of runs also the reference's answers with each decomposition, at the quick size
-    of each case.
-    """
+    """All techniques on all cases; with a ``store``, the reference's answers with each decomposition, at each case's quick size."""
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
@@ -88,43 +84,46 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
     lines = [fibres.points[low:high] for low, high in pairwise(fibres.offsets)]
     for known in (count for count in KNOWN if all(len(line) >= count + 2 for line in lines)):
         for technique, (make, _) in TECHNIQUES.items():
-            off = np.concatenate(
-                [_beside(make(line[some]), line, some) for line in lines for some in [_spread(line, known)]]
-            )
+            off = np.concatenate([_off(line, known, make) for line in lines])
             yield CurveError(case, technique, known, float(np.sqrt(np.mean(off**2))), float(off.max()))
 
 
-def _spread(line: Floats, known: int) -> Ints:
-    """The indices (known,) of points of a ``line`` (n, 3) that are spread over it evenly, with both ends."""
-    return np.rint(np.linspace(0, len(line) - 1, known)).astype(np.int64)
-
-
-def _beside(curve: Curve, line: Floats, known: Ints) -> Floats:
-    """The distances (k,) [mm] of the other points of a ``line`` (n, 3) from a curve."""
-    away, _ = cKDTree(curve(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
+def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
+    """Distances (k,) [mm] of a ``line`` (n, 3) from the curve that ``make`` makes of ``count`` of its points, spread evenly."""
+    known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
+    away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
 
 
 def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
     """Each choice of centres on each attached area with enough vertices."""
     for entry in setup.attached:
-        points = setup.surface.points[entry.vertices]
-        middle = points.mean(axis=0)
-        flat = (points - middle) @ np.linalg.svd(points - middle, full_matrices=False)[2].T
-        known, asked = flat[::2], flat[1::2]
-        for count in (count for count in CENTRES if 2 * count <= len(known)):
-            shape = np.sqrt(count) / float(np.ptp(flat[:, 0]))
-            for choice, centres in _centres(known[:, :2], known[:, 2], count, shape):
-                found = radial_basis.radial_sum(known[:, :2], known[:, 2], centres, shape, terms=_POLYNOMIAL)
-                rms = float(np.sqrt(np.mean((found(asked[:, :2]) - asked[:, 2]) ** 2)))
+        flat = _flat(setup.surface.points[entry.vertices])
+        for count in (count for count in CENTRES if 2 * count <= len(flat[::2])):
+            # In radii of the Gaussians, so that condition numbers do not depend on the unit of length.
+            places, heights = flat[:, :2] * np.sqrt(count) / float(np.ptp(flat[:, 0])), flat[:, 2]
+            known, asked = places[::2], places[1::2]
+            for choice, centres in _centres(known, heights[::2], count):
+                found = radial_basis.radial_sum(known, heights[::2], centres, 1.0, terms=_POLYNOMIAL)
+                rms = float(np.sqrt(np.mean((found(asked) - heights[1::2]) ** 2)))
                 yield HeightError(case, entry.attachment, choice, count, rms, found.condition)
 
 
-def _centres(points: Floats, heights: Floats, count: int, shape: float) -> Iterator[tuple[str, Floats]]:
+def _flat(points: Floats) -> Floats:
+    """Points (n, 3) of an area about their middle in its own axes, the last across it, in order along the first: whatever the
+    axes of the scene and the numbers of the points. The third moment along each axis is positive.
+    """
+    away = points - points.mean(axis=0)
+    flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
+    flat *= np.where((flat**3).sum(axis=0) < 0, -1, 1)
+    return np.asarray(flat[np.argsort(flat[:, 0], kind="stable")])
+
+
+def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str, Floats]]:
     """The centres (count, 2) by each choice of the report's section 3.5.1."""
     yield "grid", radial_basis.grid_centres(points, count)
     yield "Halton", radial_basis.halton_centres(points, count)
-    yield "greedy", radial_basis.greedy_centres(points, heights, count, shape, terms=_POLYNOMIAL)
+    yield "greedy", radial_basis.greedy_centres(points, heights, count, 1.0, terms=_POLYNOMIAL)
     yield "features", radial_basis.feature_centres(points, heights, count)
 
 
@@ -155,7 +154,9 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
     """
     # Candidates may not fit other fibres.
     alone = case.model_copy(update={"candidate": ()})
-    scenes = variants(alone if any("fibre" in one.needs for one in case.effects) else _pulling(alone))
+    if not any("fibre" in one.needs for one in case.effects):
+        alone = alone.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
+    scenes = variants(alone)
     if LAPLACE not in scenes:
         return
     log.info("%s: the reference with fibres of the Laplace field", case.name)
@@ -167,19 +168,9 @@ def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
         run, found = Bench(scene, store).reference(), dict[str, float]()
         if base.outcome.status == run.outcome.status == "converged":
             context = context_of(bench.setup(), base)
-            found = cost.greatest(_carrying(run), _carrying(base), context, {name.split(".")[0] for name in ANSWERS})
+            found = cost.greatest(as_surface(run), as_surface(base), context, {name.split(".")[0] for name in ANSWERS})
         picked = ({name: values[name] for name in ANSWERS if name in values} for values in (found, cost.known(bars)))
         yield AnswerChange(case.name, source, LAPLACE, run.outcome.status, *picked)
-
-
-def _pulling(case: MuscleCase) -> MuscleCase:
-    """The case with fibres that resist stretch."""
-    return case.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
-
-
-def _carrying(run: Run) -> Run:
-    """The run without fibres of its own: its surface carries those that are measured."""
-    return replace(run, fibres=None, fibre_positions=None)
 
 
 def variants(case: MuscleCase) -> dict[str, MuscleCase]:

@@ -1,4 +1,4 @@
-"""A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
+"""The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -44,7 +44,8 @@ class Bench[C: Case]:
     def _begin(self) -> None:
         """Make anew what depends on the effects that act."""
         self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
-        self._watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
+        # The watch for effects that the case left out; None where it left out none.
+        self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
     @property
     def scene(self) -> C:
@@ -66,10 +67,6 @@ class Bench[C: Case]:
     def problem(self) -> CaseProblem:
         """The problem of the case, meshed."""
         return self._problem()
-
-    def watch(self) -> Watch | None:
-        """The watch for effects that the case left out; None where it left out none."""
-        return self._watch()
 
     def of_muscle(self) -> "Bench[MuscleCase]":
         """The bench itself, where its case is one of a muscle; else InputError."""
@@ -168,7 +165,7 @@ class Bench[C: Case]:
 
     def _watched(self, solver: str) -> Watch | None:
         """The watch for effects that the case left out and that may turn out to matter."""
-        return self._watch() if solvers.takes_effects(solver) else None
+        return self.watch() if solvers.takes_effects(solver) else None
 
     def _turned_out(self, run: Run) -> tuple[Decision, ...]:
         """The effects that the case left out and that turn out to matter in a stored ``run``, at the first frame that shows one."""

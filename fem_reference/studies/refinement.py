@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import body_bars as body_differences
 from fem_reference.assessment import differences, error_bars
-from fem_reference.assessment.body_bars import BodyBars
-from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
+from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Ints
@@ -44,7 +42,6 @@ CHEAP = 0.2
 
 # What is quadratic has as many unknowns on the same cells as what is linear on cells of half the size, and does not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
-
 
 Vary = Callable[[MuscleCase], MuscleCase]
 
@@ -231,7 +228,7 @@ def body_bars(solved: Run) -> BodyBars | None:
     found = fenicsx.solve_body(other, settings.model_copy(update=changes))
     if found.outcome.status != "converged":
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
-    bars = body_differences.body_bars(solved.states, found.states, shared, sharper)
+    bars = error_bars.body_bars(solved.states, found.states, shared, sharper)
     log.info("error bars: displacement is known to %.2g %% of itself at the last frame", 100 * bars.displacement[-1])
     return bars
 

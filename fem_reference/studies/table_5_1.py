@@ -65,9 +65,8 @@ def _on(
     reference = complete(bench.reference(), scene.numbers)
     bars = refinement.stored(reference)
     context = context_of(bench.setup(), reference)
-    results = [
-        _result(scene, REFERENCE, reference, bars.of_deviations if bars else (), needs(scene, scene.reference, context))
-    ]
+    measures, own = bars.of_deviations if bars else (), needs(scene, scene.reference, context)
+    results = [_result(scene, REFERENCE, reference, measures, own)]
     chosen = _chosen(scene, rows)
     for i, (kind, candidate, place) in enumerate(chosen):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))

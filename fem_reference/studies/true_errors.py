@@ -1,14 +1,13 @@
 """The finer solutions that error bars are compared with: on smaller tetrahedra, with finer contact."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.metrics import MeasurementContext, change, context_of, measure
+from fem_reference.metrics import MeasurementContext, as_surface, change, context_of, measure
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
@@ -54,6 +53,6 @@ def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: Measur
     """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is a sharper solution."""
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
-    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in runs]  # as candidates are
+    surfaces = [as_surface(one) for one in runs]
     deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
     return [*claimed(case, "change", bars, *changes), *claimed(case, "deviation", bars, *deviations)]

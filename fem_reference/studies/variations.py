@@ -60,8 +60,7 @@ def without_states(choice: SolverChoice) -> SolverChoice:
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by a hash of their
-    contents.
+    """The case on a surface of ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
 
     A vertex is attached where the nearest of the original surface is.
     """

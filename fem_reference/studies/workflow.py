@@ -6,9 +6,8 @@ from typing import Any, overload
 
 from fem_reference import export, report, solvers
 from fem_reference.assessment import judge, second_check
-from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.assessment.error_bars import BodyBars, ErrorBars
 from fem_reference.export import paraview
 from fem_reference.foundations.given import path
 from fem_reference.foundations.progress import Progress, reported

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_reference as fr
-from fem_reference.assessment.body_bars import body_bars
+from fem_reference.assessment.error_bars import body_bars
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS
 from fem_reference.problems.paths import Rest, Turn

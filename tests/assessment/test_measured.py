@@ -1,4 +1,4 @@
-"""Current measures of a candidate: of a surface, of lines alone, and the vertices that are sampled."""
+"""Current measures of a candidate: of a surface, and of lines alone."""
 
 import json
 from dataclasses import replace
@@ -8,7 +8,7 @@ import pytest
 from balls import REFERENCE, REST, SCENE, SETUP, SHIFTS, asked, bars, checked, current, run
 
 from fem_reference.assessment import baseline
-from fem_reference.assessment.measured import CurrentMeasures, sample
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 
 
@@ -18,13 +18,6 @@ def path(tmp_path):
     file = tmp_path / "new" / "ball.json"
     baseline.update(file, current(known=bars()))
     return file
-
-
-def test_a_sample_spreads() -> None:
-    line = np.stack([np.arange(101.0), np.zeros(101), np.zeros(101)], axis=1)
-    # An end, the other, the middle, the quarters: each furthest from those before.
-    assert sample(line, 5).tolist() == [0, 100, 50, 25, 75]
-    assert sorted(sample(line[:3], 5)) == [0, 1, 2]
 
 
 def test_a_run_of_lines_alone_is_checked_by_its_fibres(tmp_path) -> None:

@@ -7,7 +7,7 @@ from studied import COST, ERROR, point
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.transfer import is_elsewhere, setting, tetrahedra, transfers
+from fem_reference.assessment.recommendation import is_elsewhere, setting, tetrahedra, transfers
 
 
 def studies(points: list[Point]) -> list[CaseStudy]:

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.distance import distances, inside, outer_windings
+from fem_reference.geometry.distance import distances, farthest_points, inside, outer_windings
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 CUBE = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))
@@ -118,3 +118,10 @@ def test_what_has_no_normal_has_no_number() -> None:
     assert np.isnan(outer_windings(BALL.moved_to(points))[7])
     points[0] = np.nan
     assert np.isnan(outer_windings(BALL.moved_to(points))).all()
+
+
+def test_farthest_points_spread() -> None:
+    line = np.stack([np.arange(101.0), np.zeros(101), np.zeros(101)], axis=1)
+    # An end, the other, the middle, the quarters: each furthest from those before.
+    assert farthest_points(line, 5).tolist() == [0, 100, 50, 25, 75]
+    assert sorted(farthest_points(line[:3], 5)) == [0, 1, 2]

@@ -1,4 +1,4 @@
-"""Pages have names that hold what makes them different, and none is lost to another."""
+"""Pages have names that hold what makes them different, and none is lost to another; the index knows every page in a folder."""
 
 import re
 from pathlib import Path
@@ -9,11 +9,13 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.cli import demo
-from fem_reference.report import index_page
-from fem_reference.report.asked import LONGEST, Asked, Part, written
+from fem_reference.report import asked as asking
+from fem_reference.report import pages
+from fem_reference.report.asked import LONGEST, Asked, Part, write_index, written
 from fem_reference.report.pages import Page
 from fem_reference.solvers import fenicsx, pbd
 from tests.report import test_headline
+from tests.report.stamped import put
 
 EMPTY = Page("study", "A title", (), "index_page.html", {"entries": (), "others": ()})
 
@@ -36,7 +38,7 @@ def test_where_the_index_cannot_be_written_the_page_is(tmp_path: Path, monkeypat
     def refuse(_: Path) -> None:
         raise OSError("no room")
 
-    monkeypatch.setattr(index_page, "write", refuse)
+    monkeypatch.setattr(asking, "write_index", refuse)
     path, lines = written(Asked("study", "study"), EMPTY, tmp_path)
     assert path.is_file()
     assert lines == [f"page: {path}", "  no index: no room"]
@@ -84,3 +86,26 @@ def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypa
     for bad in ("runs", "a/b", "", "x" * 101):
         assert cli.main(["compare", *common, "--name", bad]) == cli.BAD_INPUT
         assert "--name" in capsys.readouterr().err
+
+
+def test_the_index_has_every_page_and_no_other_folder(tmp_path: Path) -> None:
+    put(tmp_path / "verify.html", "verify", kind="verification", title="Verified")
+    put(tmp_path / "a b" / "report.html", "compare", headlines=(("mine", "fail", "off <b>"), ("reference", "pass", "")))
+    put(tmp_path / "runs" / "deep" / "report.html", "no")
+    (tmp_path / "docs").mkdir()
+    for name in ("index", "api"):
+        (tmp_path / "docs" / f"{name}.html").write_text("docs")
+    write_index(tmp_path)
+    write_index(tmp_path)  # it does not list itself
+    text = (tmp_path / "index.html").read_text()
+    body = text[text.index("<tbody>") :]
+    assert re.findall(r'<a href="([^"]*)">', body) == ["verify.html", "a%20b/report.html", "docs/index.html"]
+    assert '<span class="badge fail">fail</span> <b>mine</b>: off &lt;b&gt;' in body
+    assert "2 pages" in pages.read(tmp_path / "index.html").headlines[0][2]
+
+
+def test_an_index_of_somebody_else_stays(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("my own site")
+    put(tmp_path / "a.html", "a")
+    write_index(tmp_path)
+    assert (tmp_path / "index.html").read_text() == "my own site"

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from jinja2 import TemplateNotFound, UndefinedError
 
-from fem_reference.report import index_page, pages
+from fem_reference.report import pages
+from fem_reference.report.asked import write_index
 from fem_reference.report.pages import template
 from tests.report.stamped import put
 
@@ -49,7 +50,7 @@ def test_a_page_says_of_itself_what_it_was_given(tmp_path: Path) -> None:
 def test_what_is_no_page_of_ours_is_none_and_breaks_no_index(tmp_path: Path, text: bytes) -> None:
     (tmp_path / "mine.html").write_bytes(text)
     assert pages.read(tmp_path / "mine.html") is None
-    index_page.write(tmp_path)
+    write_index(tmp_path)
     found = (tmp_path / "index.html").read_text()
     assert '<li><a href="mine.html">mine.html</a></li>' in found
     # Nor is it written over.

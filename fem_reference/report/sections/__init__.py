@@ -1,5 +1,4 @@
 """Sections of the page of a comparison: a template each, which that page includes where its numbers exist, and facts of some.
 
-Contract (tests/report/test_sections.py): a section is shown where its numbers exist and absent where they do not, and repeats no
-id.
+Contract (tests/report/test_sections.py): a section is shown where its numbers exist and only there, and repeats no id.
 """

@@ -13,11 +13,10 @@ from fem_reference.scenes.case import Case
 
 def facts(comparison: Comparison) -> dict[str, Any]:
     """Origins as one table each, and the scene."""
-    scene = comparison.scene
-    origins = [
-        (run, _flat({key: value for key, value in run.origin.items() if key != RECORD})) for run in comparison.runs
-    ]
-    return {"origins": origins, "scene_text": _scene_text(scene)}
+    path = Path(comparison.scene.place)
+    tables = [{key: value for key, value in run.origin.items() if key != RECORD} for run in comparison.runs]
+    origins = [(run, _flat(table)) for run, table in zip(comparison.runs, tables, strict=True)]
+    return {"origins": origins, "scene_text": path.read_text(encoding="utf-8") if path.is_file() else ""}
 
 
 def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
@@ -36,9 +35,8 @@ def changes(case: Case) -> list[tuple[str, Any, Any]]:
     except InputError as error:
         return [("the scene file", "not readable any more", str(error))]
     here = dict(_flat(_table(case)))
-    return [
-        (key, in_file.get(key, ""), here.get(key, "")) for key in in_file | here if in_file.get(key) != here.get(key)
-    ]
+    changed = [key for key in in_file | here if in_file.get(key) != here.get(key)]
+    return [(key, in_file.get(key, ""), here.get(key, "")) for key in changed]
 
 
 def _table(case: Case) -> dict[str, Any]:
@@ -55,8 +53,3 @@ def _numbered(value: Any) -> Any:
     if isinstance(value, list):
         return {f"[{i}]": _numbered(inside) for i, inside in enumerate(value)}
     return value
-
-
-def _scene_text(case: Case) -> str:
-    path = Path(case.place)
-    return path.read_text(encoding="utf-8") if path.is_file() else ""

@@ -47,9 +47,8 @@ def problem(hard: Hard) -> MuscleProblem:
     middle, cell = np.asarray(block.corner) + size / 2, float((size / block.cells).min())
     start = Moved(hard.start, middle, cell) if hard.start else None
     setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval, start=start)
-    facets: dict[str, Ints] = {
-        face: index[triangles[np.isin(triangles, _on(block, skin_nodes, face)).all(axis=1)]] for face in FACES
-    }
+    on_faces = {face: np.isin(triangles, _on(block, skin_nodes, face)).all(axis=1) for face in FACES}
+    facets: dict[str, Ints] = {face: index[triangles[some]] for face, some in on_faces.items()}
     for end, hold in zip(ends, hard.hold, strict=True):
         if hold.middle:
             facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
