@@ -219,12 +219,10 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are not at rest, and of all earlier frames."""
-    seen, near = [(tuple(np.eye(4) for _ in bones), run.surface.points)], _ROUNDING * diagonal(run.surface.points)
+    seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
-        poses, points = tuple(bone.pose(number) for bone in bones), run.positions[i]
-        alike = (
-            one for earlier, one in seen if all(np.allclose(*two, 0, near) for two in zip(poses, earlier, strict=True))
-        )
+        poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
+        alike = (one for earlier, one in seen if np.allclose(poses, earlier, 0, near))
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
