@@ -52,6 +52,8 @@ def _verify(found: dict[str, Any]) -> Any:
 def _verify_groups() -> str:
     groups = dict[str, list[dict[str, Any]]]()
     for one in kept("verify")["measured"]:
+        if one["kind"] == "experiment":  # on the page of validation
+            continue
         groups.setdefault(one["group"], []).append(one)
     rows = [
         (name, len(ones), ", ".join(sorted({one["kind"] for one in ones})), number(max(map(_share, ones)), 2))
@@ -92,6 +94,50 @@ def _comparison_worst() -> str:
             cells = (f"{number(found[key]['value'])} {found[key]['unit']}" if key in found else "" for key in columns)
             rows.append((f"`{name}`", *cells, f"{number(cost['seconds_processor'], 2)} s"))
     return table("hip_flexion", ("candidate", *columns.values(), "processor time"), rows)
+
+
+def _credibility(found: dict[str, Any]) -> Any:
+    keys = ("name", "title", "unit", "value", "truth", "within", "n", "met", "validates")
+    rows = [
+        {key: row[key] for key in ("quantity", "grade", "bar", "band")}
+        | {"beside": [{key: one[key] for key in keys} for one in row["beside"]]}
+        for row in found["rows"]
+    ]
+    fits = [{key: one[key] for key in ("law", "parameters", "values", "inside")} for one in found["fits"]]
+    return {"rows": rows, "arms": found["arms"], "fits": fits}
+
+
+def _credibility_grades() -> str:
+    rows = []
+    for one in kept("credibility")["measured"]["rows"]:
+        met = f"{sum(each['met'] for each in one['beside'])} of {len(one['beside'])}" if one["beside"] else "none"
+        rows.append((one["quantity"], met, one["bar"], " to ".join(one["band"]), one["grade"]))
+    head = ("quantity", "experiments within their uncertainty", "numerical bar", "model band", "grade")
+    return table("credibility", head, rows)
+
+
+def _credibility_cubes() -> str:
+    measured = kept("credibility")["measured"]
+    found = [each for row in measured["rows"] for each in row["beside"] if each["unit"] == "1"]
+    rows = []
+    for one in found:
+        order = (one["truth"], one["within"]) == (1.0, 0.5)
+        cells = [fit["values"].get(one["name"], "") for fit in measured["fits"]]
+        said = [("yes" if cell > 0.5 else "no") if order and cell != "" else cell for cell in (one["value"], *cells)]
+        known = "yes" if order else f"{number(one['truth'])} ± {number(one['within'], 2)}"
+        said = [number(cell) if isinstance(cell, float) else cell for cell in said]
+        rows.append((one["title"], said[0], known, "within" if one["met"] else "outside", *said[1:]))
+    laws = (f"best fit: {fit['law']}" for fit in measured["fits"])
+    return table("credibility", ("", "shipped material", "measured", "", *laws), rows)
+
+
+def _credibility_arms() -> str:
+    rows = []
+    for one in kept("credibility")["measured"]["arms"]:
+        offsets = (f"{one[key]:.1f} mm" for key in ("bias", "scatter", "coarser"))
+        rows.append((f"`{one['case']}`", one["experiment"], f"{100 * one['share']:.0f} %", *offsets))
+    head = ("case", "beside", "inside, or covered", "bias", "scatter over the poses", "on larger tetrahedra")
+    return table("credibility", head, rows)
 
 
 def _reference() -> str:
@@ -186,6 +232,7 @@ MEASUREMENTS = {
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "stress": Measurement("./fem stress --steps", _stress),
+    "credibility": Measurement("./fem page credibility", _credibility),
 }
 TABLES = {
     "verify_groups": _verify_groups,
@@ -195,4 +242,7 @@ TABLES = {
     "study_reference": _study_reference,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
+    "credibility_grades": _credibility_grades,
+    "credibility_cubes": _credibility_cubes,
+    "credibility_arms": _credibility_arms,
 }

@@ -85,6 +85,16 @@ def laws() -> str:
     return _sections(effect_records())
 
 
+def ranges() -> str:
+    """The ranges of parameters of effects in the literature."""
+    rows = [
+        f"| `{name}.{key}` | {one.low} to {one.high}, {one.spread} | {_cell(one.source)} |\n"
+        for name in effects.names()
+        for key, one in effects.find(name).published.items()
+    ]
+    return "| parameter | range | source |\n|---|---|---|\n" + "".join(rows)
+
+
 def verbs() -> str:
     """The help of each verb."""
     (kinds,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -112,6 +122,7 @@ GENERATED: dict[str, Callable[[], str]] = {
     "files": files,
     "solvers": settings,
     "effects": laws,
+    "ranges": ranges,
     "verbs": verbs,
     "api": api,
     "gallery": gallery,

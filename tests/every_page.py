@@ -12,15 +12,17 @@ from fem_reference.report import (
     against_page,
     asked,
     claims_page,
+    credibility_page,
     effects_page,
     estimation_page,
     field_page,
     ranking_page,
     stress_page,
     study_page,
+    uncertainty_page,
     verify_page,
 )
-from tests.assessment import test_estimation, test_versions
+from tests.assessment import test_credibility, test_estimation, test_uncertainty, test_versions
 from tests.report import entries as made_entries
 from tests.report import examples as scalar_examples
 from tests.report import test_study_page
@@ -40,6 +42,8 @@ KINDS = (
     "effects",
     "stress",
     "estimation",
+    "credibility",
+    "uncertainty",
     "versions",
     "index",
 )
@@ -69,6 +73,8 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
         "effects": ("effects", effects_page.page(test_effects_verb.found())),
         "stress": ("stress", stress_page.page(stress(comparison))),
         "estimation": ("page", estimation_page.page(test_estimation.found())),
+        "credibility": ("page", credibility_page.page(test_credibility.found())),
+        "uncertainty": ("uncertainty", uncertainty_page.page(test_uncertainty.study(test_uncertainty.band()))),
     }
     paths = [
         report.write(report.of_comparison(one), folder / name, report.NAME, f"fem-reference compare {name}")

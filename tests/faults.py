@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 import tomllib
+from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,7 +88,9 @@ def main() -> int:
     given = parser.parse_args()
     names = given.names
     chosen = [one for one in FAULTS if not names or any(name in one.name or name in one.file for name in names)]
-    lost = [sentence for fault in chosen for sentence in misplaced(fault)]
+    twice = Counter(fault[1:4] for fault in chosen)
+    lost = [f"{old!r} in {file} is listed {count} times" for (file, old, _), count in twice.items() if count > 1]
+    lost += [sentence for fault in chosen for sentence in misplaced(fault)]
     sys.stdout.writelines(f"LOST  {sentence}\n" for sentence in lost)
     if lost or given.places:
         return 1 if lost else 0

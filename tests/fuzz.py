@@ -28,8 +28,9 @@ from hypothesis import strategies as st
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.solvers import fenicsx
 
-# Of one input: processor time [s], the time that passes on a machine that is shared, and memory [bytes].
-SECONDS, PATIENCE, MEMORY = 10, 120, 2 * 2**30
+# Of one input: processor time [s] of a damaged file and of a call, the time that passes on a machine that is shared, and memory
+# [bytes].
+SECONDS, CALL, PATIENCE, MEMORY = 10, 60, 900, 2 * 2**30
 KINDS = [*hostile.KINDS, *calls.KINDS]
 # Inputs are drawn, and neither timed, kept nor made smaller, by Hypothesis.
 UNTIMED = settings(deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
@@ -146,10 +147,13 @@ def fuzz_calls(name: str, inputs: int, number: int) -> Tried:
 def called(call: Callable[[], object]) -> str:
     """What came of a call: accepted, refused, or why it failed."""
 
-    def late(*_: object) -> None:
-        raise TimeoutError(f"more than {PATIENCE} s")
+    def late(number: int, *_: object) -> None:
+        used = f"{CALL} s of processor time" if number == signal.SIGPROF else f"{PATIENCE} s"
+        raise TimeoutError(f"more than {used}")
 
-    signal.signal(signal.SIGALRM, late)
+    for number in (signal.SIGPROF, signal.SIGALRM):
+        signal.signal(number, late)
+    signal.setitimer(signal.ITIMER_PROF, CALL)
     signal.alarm(PATIENCE)
     try:
         with warnings.catch_warnings():
@@ -169,6 +173,7 @@ def called(call: Callable[[], object]) -> str:
         places = " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in reversed(frames))
         return f"{type(error).__name__}: {str(error)[:150]} ({places})"
     finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
         signal.alarm(0)
     return "accepted"
 

@@ -5,11 +5,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from fem_reference.assessment.experiments import Fact
 from fem_reference.assessment.judge import judge
 from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
-Kind = Literal["closed form", "published", "second solver", "property"]
+Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
+# The share by which the value of an experiment may differ from the pinned one: root finding, and other processors.
+PINNED = 1e-5
 
 
 class Lab(Protocol):
@@ -70,6 +73,10 @@ class Entry:
     size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is that of the truth, ``kind`` its type.
     ``negative_control`` names one mistake, with which ``wrong`` replaces a part of ``given``: it must fail. ``slow``: a
     measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify measures these.
+
+    An entry of the kind "experiment" lays a model beside a muscle: its word is within or outside the uncertainty of the
+    experiment, and neither fails. It fails where the value is not the ``pinned`` one any more. ``facts``: the measured numbers
+    that its truth is made of.
     """
 
     name: str
@@ -89,6 +96,8 @@ class Entry:
     refinement: Refinement | None = None
     slow: bool = False
     slow_negative_control: bool = False
+    pinned: float | None = None
+    facts: tuple[Fact, ...] = ()
 
     def known(self) -> float:
         """The truth, in the unit of the entry."""
@@ -114,8 +123,9 @@ def _finding(found: float | Finding) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth; ``error`` is absolute and ``within`` its
-    bound, both in the unit of the entry, and NaN without a measurement or a truth: then the note of the finding gives the reason.
+    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth, of an experiment within or outside;
+    ``error`` is the absolute error and ``within`` its bound, both in the unit of the entry. They are NaN without a measurement or a
+    truth; then the finding's note gives the reason.
     """
 
     entry: Entry
@@ -132,8 +142,13 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass, fail or inconclusive."""
-        return judge(self.finding.value, self.truth, self.within)
+        """Pass, fail or inconclusive; of an experiment within or outside its uncertainty, and fail where the value has moved."""
+        judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
+        if pinned is None:
+            return judged
+        if judge(self.finding.value, pinned, PINNED * abs(pinned)) != "pass":
+            return "fail"
+        return {"pass": "within", "fail": "outside"}.get(judged, judged)
 
 
 def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_control: bool) -> Result:
@@ -166,8 +181,25 @@ class Verification:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass."""
-        return tuple(one for one in self.results if one.word != "pass")
+        """The results that do not pass; an experiment's does, within its uncertainty or outside."""
+        return tuple(one for one in self.results if one.word not in ("pass", "within", "outside"))
+
+    @property
+    def judged(self) -> tuple[Result, ...]:
+        """The results that pass or fail by their tolerance: those of all entries but experiments."""
+        return tuple(one for one in self.results if one.entry.kind != "experiment")
+
+    @property
+    def passed(self) -> str:
+        """The number of these that pass; empty without any."""
+        failed = sum(one in self.failed for one in self.judged)
+        return f"{len(self.judged) - failed} of {len(self.judged)} pass" if self.judged else ""
+
+    @property
+    def beside(self) -> str:
+        """The number of experiments, and of values within their uncertainty; empty without experiments."""
+        words = [one.word for one in self.results if one.entry.kind == "experiment"]
+        return f"{words.count('within')} of {len(words)} experiments met within their uncertainty" if words else ""
 
     @property
     def word(self) -> str:
@@ -177,9 +209,10 @@ class Verification:
     @property
     def summary(self) -> str:
         """The verdict in one line."""
-        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
-        note = f", {controls} measured with their negative control" if controls else ""
-        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
+        controls = sum(one.with_negative_control for one in self.results)
+        note = f"{controls} measured with their negative control" if controls else ""
+        said = filter(None, (self.word, self.passed, note, self.beside, f"{self.seconds:.0f} s"))
+        return f"verdict: {', '.join(said)}"
 
     @property
     def groups(self) -> dict[str, list[Result]]:

@@ -40,14 +40,6 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
     return np.where(lost[:, None] | context.exempt.vertices, np.nan, gaps)
 
 
-def fibre_points(run: Run, context: MeasurementContext) -> Floats:
-    """Positions of the points of the fibres, (f, m, 3) [mm]: from the run itself, or carried by its surface."""
-    own = run.fibre_positions
-    if own is not None and own.shape[1:] == context.fibres.points.shape:
-        return own
-    return np.stack([context.extension.apply(points) for points in run.positions])
-
-
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
     """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm]: the length of the pieces that meet at a
     point over that at rest.

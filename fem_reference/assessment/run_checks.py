@@ -219,11 +219,14 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are not at rest, and of all earlier frames."""
-    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * diagonal(run.surface.points)
+    seen, near = [(tuple(np.eye(4) for _ in bones), run.surface.points)], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
-        now = (run.positions[i], *(bone.pose(number) for bone in bones))
-        if not any(all(np.abs(a - b).max() <= near for a, b in zip(now, one, strict=True)) for one in seen):
-            seen.append(now)
+        poses, points = tuple(bone.pose(number) for bone in bones), run.positions[i]
+        alike = (
+            one for earlier, one in seen if all(np.allclose(*two, 0, near) for two in zip(poses, earlier, strict=True))
+        )
+        if not any(np.abs(points - one).max() <= near for one in alike):
+            seen.append((poses, points))
             yield i, number
 
 
@@ -231,13 +234,13 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
     allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    rest = run.surface
+    rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            give = _give(problem, bone, float(pressures[i]))
+            give = _give(problem, bone, float(pressures[i]), apart)
             check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
@@ -261,11 +264,13 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 
-def _give(problem: MuscleProblem, bone: Bone, pressure: float) -> float:
-    """The allowed penetration [mm]: give of contact under a ``pressure`` [MPa], error of the distance, part between points."""
+def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
+    """The allowed penetration [mm] of a bone: the give of contact under the recorded ``pressure`` [MPa], the error of the bone's
+    distance, and the part between contact points, which are half of ``apart`` [mm] apart.
+    """
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
-    return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)
+    return pressure / problem.contact.stiffness + known + _BETWEEN * apart
 
 
 def _behind(surface: Surface, place: Floats) -> float:

@@ -32,7 +32,9 @@ def main(arguments: list[str]) -> int:
     try:
         words = [word for word in arguments if not word.startswith("-")]
         options = parser(words[0] if words else "").parse_args(arguments)
-        _show_progress(on=not options.quiet)
+        log = logging.getLogger("fem_reference")  # our own lines, and nobody else's
+        log.setLevel(logging.WARNING if options.quiet else logging.INFO)
+        log.handlers[:] = [logging.StreamHandler(sys.stderr)]
         _check_outputs(options)
         _check_name(options.page_name)
         status: int = options.verb(options)
@@ -89,9 +91,8 @@ def _check_name(name: str | None) -> None:
     """InputError where ``--name`` cannot be the name of a page: the other files beside pages have names of their own."""
     from fem_reference.report.asked import LONGEST  # what it needs may be missing, which is said below
 
-    if name is not None and (
-        name in ("runs", "docs", "index") or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)
-    ):
+    taken = ("runs", "docs", "index")
+    if name is not None and (name in taken or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)):
         want = f"at most {LONGEST} letters, digits and . _ = + -, and not runs, docs or index"
         raise InputError("--name", f'"{name}"', want)
 
@@ -103,15 +104,6 @@ def _check_folder(place: str, folder: Path, *, written: bool) -> None:
         raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")
     if written and not os.access(there, os.W_OK | os.X_OK):
         raise InputError(place, f'"{folder}", where "{there}" cannot be written into', "a folder that can")
-
-
-def _show_progress(*, on: bool) -> None:
-    """Our own log lines, and nobody else's, on standard error."""
-    log = logging.getLogger("fem_reference")
-    log.setLevel(logging.INFO if on else logging.WARNING)
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(logging.Formatter("%(message)s"))
-    log.handlers[:] = [handler]
 
 
 def out(options: argparse.Namespace) -> Path:

@@ -71,7 +71,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
         if Path(text).is_dir():
             got = f'"{text}", a candidate of the case and a folder'
             raise InputError("--candidate", got, f"another name, or ./{text}")
-        return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+        return own_candidates(case)[names.index(text)]
     if text in solvers.names(case.task) and not Path(text).exists():
         found = solvers.choice(case, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"

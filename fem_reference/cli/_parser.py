@@ -57,6 +57,10 @@ _SHARED: dict[str, dict[str, Any]] = {
         "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
     },
     "--workers": {"type": int, "default": 1, "metavar": "N", "help": "how many runs are made at once (default: 1)"},
+    "--scheduler": {
+        "metavar": "ADDRESS",
+        "help": "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too",
+    },
 }
 
 
@@ -78,17 +82,15 @@ def verb(name: str) -> ModuleType:
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
     """The parser of the whole command line; with ``only`` a verb, that alone is imported: all of them take seconds to load."""
-    whole = argparse.ArgumentParser(
-        prog="fem-reference", description="Finite element reference and validation for muscle deformation."
-    )
+    about = "Finite element reference and validation for muscle deformation."
+    whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
         # What a verb is for is read from its file: to import it takes long.
-        assigned = [
-            node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)
-        ]
-        (text,) = (ast.literal_eval(one.value) for one in assigned if ast.unparse(one.targets[0]) == "HELP")
+        body = ast.parse((_FOLDER / f"{name}.py").read_bytes()).body
+        assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
+        text = ast.literal_eval(assigned["HELP"])
         sub = kinds.add_parser(name, help=text, description=text)
         if only in (None, name):
             _add(verb(name), sub)
@@ -109,13 +111,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 class _Given(argparse.Action):
     """The value of an option, given once: a second one would silently replace it. A list has each of its values once."""
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         """Take it."""
         del parser
         if option_string and isinstance(self.default, list):

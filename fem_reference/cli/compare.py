@@ -31,9 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     past = "what the candidate was, and write the page of what changed: a baseline of check, a stored run, a folder of frames"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
-    limit = (
-        "judge every candidate: how far a statistic may deviate, such as surface_deviation.max='5 mm'; may be repeated"
-    )
+    limit = "judge candidates: how far a statistic may deviate, such as surface_deviation.max='5 mm'; may be repeated"
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
     share(parser, "--error-bar", "--negative-control", "--name", "--ranks")
 

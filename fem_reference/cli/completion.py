@@ -20,9 +20,8 @@ _ALIASES = {
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Option for the shell; it writes nothing into ``--out``."""
-    parser.add_argument(
-        "shell", metavar="SHELL", choices=sorted(_ALIASES), help=f"one of {', '.join(sorted(_ALIASES))}"
-    )
+    shells = sorted(_ALIASES)
+    parser.add_argument("shell", metavar="SHELL", choices=shells, help=f"one of {', '.join(shells)}")
     parser.set_defaults(writes=False)
 
 

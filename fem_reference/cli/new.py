@@ -18,9 +18,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(writes=False)
     parser.add_argument("name", metavar="NAME", type=Path, help="the folder that is made; its name is the scene's name")
     parser.add_argument("--from", dest="case", metavar="CASE", help="a case that is copied (default: hip_flexion)")
-    parser.add_argument(
-        "--muscle", type=Path, metavar="FILE", help="triangles of a muscle, closed (STL, PLY, OBJ, VTP, ...)"
-    )
+    muscle = "triangles of a muscle, closed (STL, PLY, OBJ, VTP, ...)"
+    parser.add_argument("--muscle", type=Path, metavar="FILE", help=muscle)
     bones = "triangles of a bone, whose name is that of the file; at least two, each with its --bone"
     parser.add_argument("--bone", type=Path, action="append", default=[], metavar="FILE", help=bones)
     unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed by the sizes of all of them, and said)"

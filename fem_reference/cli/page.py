@@ -5,32 +5,35 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from fem_reference import report
+from fem_reference.assessment import credibility
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
-from fem_reference.report import claims_page, estimation_page, field_page, ranking_page
+from fem_reference.report import claims_page, credibility_page, estimation_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import estimation, judging, table_5_1, true_errors
+from fem_reference.studies import cube_fits, estimation, judging, moment_arms, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
+from fem_reference.verification import experiments, runner
 
 HELP = "write a page over several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
 EXAMPLES = "octave-examples"
 ESTIMATION = "estimation"
+CREDIBILITY = "credibility"
 OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION])
+    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION, CREDIBILITY])
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
@@ -50,9 +53,10 @@ def run(options: argparse.Namespace) -> int:
     if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
         return _claims(options) if options.name == CLAIMS else _estimation(options)
     if options.case or options.candidate or options.unit:
-        given = "--case, --candidate or --unit" if options.name == EXAMPLES else "--candidate or --unit"
+        without_cases = options.name in (EXAMPLES, CREDIBILITY)
+        given = "--case, --candidate or --unit" if without_cases else "--candidate or --unit"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
-    return _examples(options)
+    return _credibility(options) if options.name == CREDIBILITY else _examples(options)
 
 
 def _examples(options: argparse.Namespace) -> int:
@@ -61,10 +65,8 @@ def _examples(options: argparse.Namespace) -> int:
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
         results = tuple(judging.judged(bench, own_candidates(bench.scene)) for bench in benches)
-    asked = _asked([], options)
-    path, lines = written(
-        asked, field_page.page("The report's Octave examples", results), out(options), options.page_name
-    )
+    page = field_page.page("The report's Octave examples", results)
+    path, lines = written(_asked([], options), page, out(options), options.page_name)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
@@ -78,18 +80,14 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    more = [
-        Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}")
-        for case, found in foreign.items()
-        for one in found
-    ]
+    pairs = [(case, one) for case, found in foreign.items() for one in found]
+    more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
     asked = _asked(scenes.values(), options, more)
     publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
 def _claims(options: argparse.Namespace) -> int:
-    """Error bars beside errors."""
     scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
     found = true_errors.stake(scenes, out(options) / "runs")
     whole = Cover.of(found.claims)
@@ -102,7 +100,6 @@ def _claims(options: argparse.Namespace) -> int:
 
 
 def _estimation(options: argparse.Namespace) -> int:
-    """The report's estimation techniques."""
     scenes = [casefile.read_muscle(case) for case in options.case or estimation.CASES]
     with fenicsx.shared():
         found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
@@ -116,8 +113,21 @@ def _estimation(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _credibility(options: argparse.Namespace) -> int:
+    """The evidence for each quantity; moment arms where the anatomy is there."""
+    with fenicsx.shared():
+        arms, missing = moment_arms.beside(out(options) / "runs")
+    entries, results = runner.entries().values(), experiments.results()
+    rows = tuple(credibility.row(claim, entries, results, arms) for claim in credibility.claims())
+    fits = (cube_fits.shipped_law(), cube_fits.collagen_law())
+    found = credibility.Credibility(rows, arms, missing, fits)
+    printed = [credibility_page.said(found), *(f"left out: {case}: {why}" for case, why in missing.items())]
+    page = credibility_page.page(found)
+    publish(options, _asked([], options), page, credibility_page.facts(found), "\n".join(printed))
+    return DONE
+
+
 def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:
-    """The page over the cases that were asked for."""
     cases = [Part(("--case", case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
     return Asked("page", options.name, (Part((options.name,)), *cases, *more))
 

@@ -23,11 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("cases", metavar="CASE", nargs="+", help=CASE)
     change = "change a key of every case, such as muscle.tet_size='8 mm'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
-    share(parser, "--workers")
-    cluster = (
-        "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too"
-    )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
+    share(parser, "--workers", "--scheduler")
     only = "only this solver; may be repeated (default: the reference and every candidate)"
     parser.add_argument("--solver", default=[], choices=solvers.names("solve"), metavar="NAME", help=only)
     share(parser, "--name")

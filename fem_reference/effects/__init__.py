@@ -22,7 +22,7 @@ from pydantic import Field, field_validator
 from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
-from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.limits import Limit, Range
 from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.material_point import State as State
 from fem_reference.foundations.material_point import fibre_tension
@@ -58,13 +58,15 @@ class Effect(Record):
     ``unknowns``: names of the fields that it adds; ``needs``: its requirements: of the rest state, ``"fibre"``; of the frames,
     ``"interval"``, the time between frame numbers; of a step, ``"momentum"``, velocities and predicted displacements;
     ``outer``: True where it acts from outside the body, so that its forces do not balance by themselves; ``example``: some of its
-    parameters, as scene files write them, besides those of its kind.
+    parameters, as scene files write them, besides those of its kind; ``published``: by name the ranges of its parameters in the
+    literature of muscle.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
     outer: ClassVar[bool] = False
     example: ClassVar[dict[str, Any]] = {}
+    published: ClassVar[dict[str, Range]] = {}
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
         """The amount of it that acts at a frame: 1, unless it has a ramp."""

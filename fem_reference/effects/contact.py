@@ -28,10 +28,8 @@ class Contact(Interaction):
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
         depth = math.hypot(*(one.depth for one in near.values()))
-        reached = "; ".join(
-            f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing
-        )
-        rule = f"guaranteed clearance to bones [mm] ({reached or 'no bone is reached'})"
+        reached = [f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing]
+        rule = f"guaranteed clearance to bones [mm] ({'; '.join(reached) or 'no bone is reached'})"
         return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:

@@ -27,12 +27,9 @@ class Damping(Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam under the drag, and the shift of a bar along it."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
-        return Indicator(
-            "drag over the length against the shear modulus",
-            force * scene.length / scene.shear,
-            scene.lag(scene.bend(sideways) + scene.draw(force)),
-            force * scene.length,
-        )
+        rule, stress = "drag over the length against the shear modulus", force * scene.length
+        lag = scene.lag(scene.bend(sideways) + scene.draw(force))
+        return Indicator(rule, stress / scene.shear, lag, stress)
 
     def resultant(self, shape: Shape) -> Wrench | None:
         """The drag on the whole body."""

@@ -6,8 +6,15 @@ from pydantic import Field
 
 from fem_reference.effects import Energy, Ramped, State, fibre_indicator
 from fem_reference.foundations.indicators import Estimates, Indicator
-from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.limits import Limit, Range
 from fem_reference.foundations.units import PositivePressure
+
+PEAK_STRESS = Range(
+    low="225 kPa",
+    high="350 kPa",
+    source="specific tension: 22.5 N/cm2 in small mammals, 26.8 as the weighted mean of 96 human values (Persad et al. 2024, "
+    "doi 10.1152/japplphysiol.00296.2024); 0.35 MPa (Zajac 1989, Crit Rev Biomed Eng 17:359)",
+)
 
 
 class FibreActive(Ramped, Energy):
@@ -22,6 +29,7 @@ class FibreActive(Ramped, Energy):
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
     example: ClassVar[dict[str, Any]] = {"stress": "300 kPa", "optimal_stretch": 1.1}
+    published: ClassVar[dict[str, Range]] = {"stress": PEAK_STRESS}
     stress: PositivePressure
     optimal_stretch: float = Field(gt=0)
 

@@ -5,8 +5,15 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Moduli, PassiveFibres, State
-from fem_reference.foundations.limits import Limit
+from fem_reference.effects.fibre_active import PEAK_STRESS
+from fem_reference.foundations.limits import Limit, Range
 from fem_reference.foundations.units import PositivePressure
+
+# In this form Thelen's exp(k (l - 1)/e) - 1 over exp(k) - 1 has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6.
+_SOURCE = (
+    "Blemker, Pinsky and Delp 2005 (0.05 and 6.6, doi 10.1016/j.jbiomech.2004.04.009) to Thelen 2003 (doi 10.1115/1.1531112, "
+    "exponent 5 and strain 0.6 at the peak active stress: 0.00678 and 8.33)"
+)
 
 
 class FibrePassive(PassiveFibres):
@@ -27,6 +34,11 @@ class FibrePassive(PassiveFibres):
         "p2": 6.6,
         "optimal_stretch": 1.1,
         "linear_from": 1.4,
+    }
+    published: ClassVar[dict[str, Range]] = {
+        "stress": PEAK_STRESS,
+        "p1": Range(low=0.00678, high=0.05, source=_SOURCE),
+        "p2": Range(low=6.6, high=8.33, source=_SOURCE),
     }
     stress: PositivePressure
     p1: float = Field(gt=0)

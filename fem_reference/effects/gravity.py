@@ -25,12 +25,8 @@ class Gravity(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
-        return Indicator(
-            "weight over the length against the shear modulus",
-            force * scene.length / scene.shear,
-            scene.bend(force),
-            force * scene.length,
-        )
+        rule, stress = "weight over the length against the shear modulus", force * scene.length
+        return Indicator(rule, stress / scene.shear, scene.bend(force), stress)
 
     def resultant(self, shape: Shape) -> Wrench:
         """The weight."""

@@ -1,6 +1,5 @@
 """Two families of fibres at an angle to the fibre direction that stiffen as they are stretched, as in arteries and fascia."""
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
@@ -29,7 +28,7 @@ class HolzapfelOgden(Energy):
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack families."""
         f, functions = state.fibre, state.functions
-        across = _cross(self.normal, f)
+        across = [self.normal[i] * f[k] - self.normal[k] * f[i] for i, k in ((1, 2), (2, 0), (0, 1))]
         length = functions.sqrt(sum(entry**2 for entry in across))
         cosine, sine = functions.cos(self.angle), functions.sin(self.angle)
         energy = 0
@@ -39,7 +38,3 @@ class HolzapfelOgden(Energy):
             strain = functions.above(square, 1, square - 1, 0)
             energy += self.k1 / (2 * self.k2) * (functions.exp(self.k2 * strain**2) - 1)
         return energy
-
-
-def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]

@@ -31,22 +31,15 @@ class Viscosity(Energy):
         """The lag of a body, as a part of its travel, over its relaxation time."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
-        return Indicator(
-            "Deborah number, relaxation time over the time of the motion",
-            deborah,
-            scene.lag(0.25 * deborah * scene.travel),
-            2 * self.eta * rate,
-        )
+        rule, lag = "Deborah number, relaxation time over the time of the motion", 0.25 * deborah * scene.travel
+        return Indicator(rule, deborah, scene.lag(lag), 2 * self.eta * rate)
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""
         before = State(F=state.F_before)
-        axes, grown = before.cofactors, _difference(state.C, before.C)
+        axes, now, then = before.cofactors, state.C, before.C
+        grown = [[now[i][k] - then[i][k] for k in range(3)] for i in range(3)]
         half = [[sum(axes[i][k] * grown[k][m] for k in range(3)) for m in range(3)] for i in range(3)]
         strain = [[sum(half[i][m] * axes[j][m] for m in range(3)) for j in range(3)] for i in range(3)]
         square = sum(entry**2 for row in strain for entry in row)  # of 2 J_before^2 e
         return self.eta / 4 * state.rate * square / before.J**3
-
-
-def _difference(now: Any, before: Any) -> list[list[Any]]:
-    return [[now[i][k] - before[i][k] for k in range(3)] for i in range(3)]

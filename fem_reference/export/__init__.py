@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fem_reference.export import febio, febio_contact, open_formats, texts
-from fem_reference.export.folders import check, new_folder
+from fem_reference.export import febio, febio_contact, open_formats
+from fem_reference.export.folders import check, new_folder, write_text
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
@@ -42,11 +42,11 @@ def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, f
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format) -> None:
     open_formats.write(case, problem, folder)
-    texts.write(folder / "candidate.toml", case)
-    texts.write(folder / "README.md", case, more=_FEBIO_FILES if form == "febio" else "")
+    write_text(folder / "candidate.toml", case)
+    write_text(folder / "README.md", case, more=_FEBIO_FILES if form == "febio" else "")
     if form == "febio":
         differences = febio_contact.notes(problem)
         for difference in differences:
             log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)
-        texts.write(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))
+        write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))

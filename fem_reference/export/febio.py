@@ -41,16 +41,11 @@ def check(case: MuscleCase) -> None:
     """Raise InputError where FEBio lacks an effect of the case, or has it in another form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
-            same = ", ".join(name_of(kind) for kind in SAME)
-            raise InputError(
-                join(case.place, f"effect[{i}]"),
-                f'"{name_of(effect)}"',
-                f"what FEBio has in the same form: {same}",
-            )
-    for kinds, got in (
-        ((NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"),
-        ((Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"),
-    ):
+            want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
+            raise InputError(join(case.place, f"effect[{i}]"), f'"{name_of(effect)}"', want)
+    matrix = (NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"
+    volume = (Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"
+    for kinds, got in (matrix, volume):
         if not any(isinstance(effect, kinds) for effect in case.effects):
             raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
 

@@ -92,10 +92,8 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
 def notes(problem: MuscleProblem) -> list[str]:
     """Differences of the model in FEBio, in sentences with their numbers: springs at points, bones that overlap at rest."""
     # Springs that the reference has over facets too are the same in FEBio.
-    springs = [
-        _springs(problem, one) for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins
-    ]
-    return [*springs, *([MEASURED] if springs else []), *_overlapping(problem)]
+    on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
+    return [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else []), *_overlapping(problem)]
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:

@@ -13,9 +13,7 @@ from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
-from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.setup import Bone
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
@@ -26,7 +24,9 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
     _muscle(materials, problem.effects)
     for number, bone in enumerate(problem.bones, start=2):
         rigid = SubElement(materials, "material", id=str(number), name=bone_id(bone), type="rigid body")
-        leaves(rigid, {"density": 1e-9, "center_of_mass": vector(_centre(bone))})
+        middle = bone.surface.points.mean(axis=0)
+        turned_about = None if bone.motion is None else bone.motion.centre
+        leaves(rigid, {"density": 1e-9, "center_of_mass": vector(middle if turned_about is None else turned_about)})
 
 
 def _muscle(materials: Element, effects: Sequence[Effect]) -> None:
@@ -78,12 +78,6 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}
     return off | toe | {"lam_max": effect.linear_from * effect.optimal_stretch}
-
-
-def _centre(bone: Bone) -> Floats:
-    """The point [mm] that FEBio turns a bone about: that of its motion."""
-    centre = None if bone.motion is None else bone.motion.centre
-    return np.asarray(bone.surface.points.mean(axis=0) if centre is None else centre)
 
 
 def add_fibres(root: Element, problem: MuscleProblem) -> None:

@@ -1,21 +1,23 @@
-"""The folder of an export: a new one, written whole or not at all."""
+"""The folder of an export, a new one, written whole or not at all, and the texts in it, which are files of this folder."""
 
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from string import Template
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.version import __version__
 from fem_reference.io import files
+from fem_reference.scenes.muscle import MuscleCase
 
 
 def check(folder: Path) -> None:
     """Raise InputError unless ``folder`` is missing or empty."""
-    if folder.is_file():
-        raise InputError("--to", f'"{folder}", a file', "a folder that is not there yet, or empty")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError("--to", f'"{folder}", which is not empty', "a folder that is not there yet, or empty")
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        got = f'"{folder}", {"a file" if folder.is_file() else "which is not empty"}'
+        raise InputError("--to", got, "a folder that is not there yet, or empty")
 
 
 @contextmanager
@@ -35,3 +37,10 @@ def new_folder(folder: Path) -> Iterator[Path]:
         for parent in above:
             with suppress(OSError):  # where something is in it, as when all went well
                 parent.rmdir()
+
+
+def write_text(path: Path, case: MuscleCase, file: str | None = None, **values: str) -> None:
+    """Write the text of a ``file`` of this folder, by default that of the same name, with facts of the ``case`` and ``values``."""
+    template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
+    known = {"title": case.title, "name": case.name, "version": __version__, "first": str(case.frames.first)}
+    files.write_text(path, template.substitute(known | values))

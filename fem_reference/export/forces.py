@@ -30,11 +30,8 @@ _NOWHERE = np.zeros(3)
 def write_table(comparison: Comparison, path: Path) -> None:
     """Write a row for each run, frame and bone that has a force or a joint; unknown and infinite values are left empty."""
     found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
-    write_csv(
-        path,
-        COLUMNS,
-        (["" if isinstance(value, float) and not math.isfinite(value) else value for value in row] for row in found),
-    )
+    cells = (["" if isinstance(one, float) and not math.isfinite(one) else one for one in row] for row in found)
+    write_csv(path, COLUMNS, cells)
 
 
 def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object, ...]]:

@@ -45,20 +45,14 @@ def bone_files(problem: MuscleProblem) -> list[str]:
 
 
 def _write_tables(problem: MuscleProblem, folder: Path) -> None:
-    poses = [
-        (bone.name, frame, *map(repr, bone.pose(frame).ravel().tolist()))
-        for bone in problem.bones
-        for frame in problem.frames
-    ]
+    each = [(bone, frame) for bone in problem.bones for frame in problem.frames]
+    poses = [(bone.name, frame, *map(repr, bone.pose(frame).ravel().tolist())) for bone, frame in each]
     entries = [f"m{row}{column}" for row in range(4) for column in range(4)]
     write_csv(folder / "poses.csv", ("bone", "frame", *entries), poses)
     attached = [(one.attachment, one.bone.name, vertex) for one in problem.attached for vertex in one.vertices.tolist()]
     write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), attached)
-    facets = [
-        (one.attachment, one.bone.name, *facet)
-        for one in problem.attached
-        for facet in problem.mesh.facets[one.attachment].tolist()
-    ]
+    of = problem.mesh.facets
+    facets = [(one.attachment, one.bone.name, *abc) for one in problem.attached for abc in of[one.attachment].tolist()]
     write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
     within = embed(problem.mesh, problem.surface.points)
     places = zip(within.tets.tolist(), within.barycentric.tolist(), strict=True)
@@ -110,8 +104,7 @@ def write_lines(path: Path, lines: Polylines) -> None:
     """The polylines as legacy VTK in text, coordinates in full."""
     ends = lines.offsets.tolist()
     cells = [" ".join(map(str, (b - a, *range(a, b)))) for a, b in pairwise(ends)]
-    head = (
-        f"# vtk DataFile Version 3.0\nfibres at rest, mm\nASCII\nDATASET POLYDATA\nPOINTS {len(lines.points)} double\n"
-    )
+    head = ["# vtk DataFile Version 3.0", "fibres at rest, mm", "ASCII", "DATASET POLYDATA"]
+    head += [f"POINTS {len(lines.points)} double", *rows(lines.points)]
     size = f"LINES {len(cells)} {len(lines.points) + len(cells)}"
-    files.write_text(path, head + "\n".join([*rows(lines.points), size, *cells, ""]))
+    files.write_text(path, "\n".join([*head, size, *cells, ""]))

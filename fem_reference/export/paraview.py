@@ -8,21 +8,21 @@ frames/frame_0010.vtm    reference and candidates (muscle, fibres; of the refere
 import logging
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.effects.contact import among
-from fem_reference.export import forces, texts
-from fem_reference.export.folders import new_folder
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
+from fem_reference.export import forces
+from fem_reference.export.folders import new_folder, write_text
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.io.formats.vtk import DataBlock, Tree, write_blocks
 from fem_reference.metrics import MeasurementContext
+from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
 from fem_reference.runs.contents import frame_file
@@ -59,7 +59,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
         forces.write_table(comparison, part / forces.FILE)
         unit = "frame numbers" if case.frames.interval is None else "seconds"
         lacking = _NO_STATES if frames.results is None else ""
-        texts.write(part / "README.md", case, "PARAVIEW.md", unit=unit, lacking=lacking)
+        write_text(part / "README.md", case, "PARAVIEW.md", unit=unit, lacking=lacking)
         return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
 
 
@@ -76,7 +76,7 @@ class _Frames:
             inside = np.clip(found.barycentric, 0, None)  # a vertex outside of the tetrahedra has what is at their skin
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
-        self.fibres = {run.name: local_fields.fibre_points(run, self.context) for run in comparison.runs}
+        self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
 
     def _of_surface(self, run: Run) -> Iterator[tuple[str, Floats]]:
         """Arrays (f, n) at the vertices of a run, by name."""
@@ -118,9 +118,8 @@ class _Frames:
         bones = {}
         for bone in self.setup.bones:
             points = bone.surface.points
-            bones[bone.name] = DataBlock(
-                points, bone.surface.triangles, _moved(points, apply(bone.pose(number), points))
-            )
+            moved = _moved(points, apply(bone.pose(number), points))
+            bones[bone.name] = DataBlock(points, bone.surface.triangles, moved)
         now = self.reference.positions[i]
         attachments = {one.attachment: _part(rest, one.vertices, now) for one in self.setup.attached}
         runs = {run.name: self._run(run, i) for run in self.comparison.candidates}
@@ -129,13 +128,16 @@ class _Frames:
 
     def _run(self, run: Run, i: int) -> dict[str, DataBlock]:
         """The blocks of a ``run`` at a frame."""
-        blocks = {}
+        blocks, frame = {}, run.numbers[i]
+        state = self.results if run is self.reference else None
+        state = None if state is None or frame not in state.frames else state
         known = {name: float(values[i]) for name, values in run.scalars.items() if np.isfinite(values[i])}
-        numbers = {"frame": float(run.numbers[i])} | known
+        numbers = {"frame": float(frame)} | known
         if run.has_surface:
             rest = self.setup.surface
             arrays = _moved(rest.points, run.positions[i]) | {k: v[i] for k, v in self.arrays[run.name].items()}
-            arrays |= self._at_surface(run, i)
+            if state is not None and self.within is not None:
+                arrays |= state.evaluate_in(*self.within, frame, _names(state, frame))
             blocks["muscle"] = DataBlock(rest.points, rest.triangles, arrays, numbers=numbers)
         lines, points = self.context.fibres, self.fibres[run.name][i]
         stretch = {"fibre_stretch": local_fields.stretch_along(lines, points[None])[0]}
@@ -143,16 +145,9 @@ class _Frames:
         blocks["fibres"] = DataBlock(lines.points, lines, _moved(lines.points, points) | stretch, whole)
         if (pull := forces.block(run, self.setup, i)) is not None:
             blocks["forces"] = pull
-        if run is self.reference and self.results is not None and run.numbers[i] in self.results.frames:
-            blocks["interior"] = interior(self.results, run.numbers[i])
+        if state is not None:
+            blocks["interior"] = interior(state, frame)
         return blocks
-
-    def _at_surface(self, run: Run, i: int) -> dict[str, Any]:
-        """Arrays at the vertices of the reference that follow from its state, by name."""
-        frame = run.numbers[i]
-        if run is not self.reference or self.results is None or self.within is None or frame not in self.results.frames:
-            return {}
-        return self.results.evaluate_in(*self.within, frame, _names(self.results, frame))
 
 
 def interior(made: Results, frame: float) -> DataBlock:
@@ -161,19 +156,14 @@ def interior(made: Results, frame: float) -> DataBlock:
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
-    return DataBlock(mesh.points, mesh.tets, {"displacement": _at_nodes(mesh, made.states[frame].displacement)}, cells)
+    displacement = np.zeros_like(mesh.points)
+    displacement[mesh.tets] = made.states[frame].displacement[:, :4]  # of nodes the corners come first
+    return DataBlock(mesh.points, mesh.tets, {"displacement": displacement}, cells)
 
 
 def _names(made: Results, frame: float) -> list[str]:
     """The arrays of a frame that are written, beside displacement."""
     return [name for name in made.names(made.states[frame]) if name in _EVALUATED]
-
-
-def _at_nodes(mesh: TetMesh, displacement: Floats) -> Floats:
-    """The displacement (n, 3) of the points of a mesh, from that at the nodes of its tetrahedra, the corners first."""
-    found = np.zeros_like(mesh.points)
-    found[mesh.tets] = displacement[:, :4]
-    return found
 
 
 def _states(comparison: Comparison) -> Results | None:

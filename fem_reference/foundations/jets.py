@@ -49,9 +49,8 @@ class Jet:
 
     def __mul__(self, other: Any) -> "Jet":
         if not isinstance(other, Jet):
-            return Jet(
-                self.value * other, self.slope * other, None if self.curvature is None else self.curvature * other
-            )
+            curvature = None if self.curvature is None else self.curvature * other
+            return Jet(self.value * other, self.slope * other, curvature)
         value, slope = self.value * other.value, self.value * other.slope + other.value * self.slope
         if self.curvature is None:
             return Jet(value, slope, None)

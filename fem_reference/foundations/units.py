@@ -163,6 +163,17 @@ def unit_of(metadata: Sequence[object]) -> str:
     return next((KINDS[reader.keywords["kind"]].unit for reader in readers if isinstance(reader, partial)), "")
 
 
+def field_unit(field: Any) -> str:
+    """The unit inside of a ``field`` of a record, which stands with its type, or with one of several; empty where it has none."""
+    inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in kinds(field.annotation))
+    return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
+
+
+def kinds(annotation: Any) -> list[Any]:
+    """A type and all that it is made of."""
+    return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in kinds(part))]
+
+
 def written(value: Any, unit: str) -> Any:
     """A number, or three, as text with the ``unit`` that it has inside; values without a unit, and texts, unchanged.
 

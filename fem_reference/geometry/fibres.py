@@ -85,7 +85,7 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
     values[np.intersect1d(zeros, ones)] = 0.5
     basis = skfem.Basis(skfem.MeshTet(mesh.points.T.copy(), mesh.tets.T.copy()), skfem.ElementTetP1())
     values = skfem.solve(*skfem.condense(laplace.assemble(basis), x=values, D=np.union1d(zeros, ones)))
-    return FibreField(mesh, values, _gradients(mesh, values), mesh.facets[start], mesh.facets[end])
+    return FibreField(mesh, values, averaged(mesh, _slopes(mesh, values)), mesh.facets[start], mesh.facets[end])
 
 
 def trace(field: FibreField, count: int) -> Polylines:
@@ -97,7 +97,7 @@ def trace(field: FibreField, count: int) -> Polylines:
     if len(seeds) == 0:
         got = "nothing between the two attachments"
         raise InputError("fibres.traced", got, "two attachments with muscle between them")
-    seeds = _spread(seeds, 4 * count)
+    seeds = spread(seeds, 4 * count)
     back, came_back = _follow(field, seeds, field.start, -1.0)
     ahead, came_ahead = _follow(field, seeds, field.end, 1.0)
     whole = np.flatnonzero(came_back & came_ahead)[:count]
@@ -133,11 +133,15 @@ class NearestLine:
         return middles, (along / np.maximum(lengths, np.finfo(float).tiny)[:, None])[lengths > 0]
 
 
-def _gradients(mesh: TetMesh, values: Floats) -> Floats:
-    """Gradient (n, 3) at each point: that of the tets around it, averaged by volume."""
+def _slopes(mesh: TetMesh, values: Floats) -> Floats:
+    """The gradient (k, 3) in each tet of ``values`` (n,) at the points."""
     corners = mesh.points[mesh.tets]
     rises = values[mesh.tets[:, 1:]] - values[mesh.tets[:, :1]]
-    slopes = np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0]
+    return np.asarray(np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0])
+
+
+def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
+    """Vectors (n, 3) at the points of a ``mesh``: those of the tets around each, ``slopes`` (k, 3), averaged by volume."""
     volumes = np.repeat(tet_volumes(mesh.points, mesh.tets), 4)
     share = np.bincount(mesh.tets.ravel(), weights=volumes, minlength=len(mesh.points))
     weighted = (volumes * np.repeat(slope, 4) for slope in slopes.T)
@@ -165,8 +169,8 @@ def _seeds(field: FibreField) -> Floats:
     return np.asarray(seeds[depths > enough])
 
 
-def _spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, 3), the most central first, then each the farthest from those before it."""
+def spread(points: Floats, count: int) -> Floats:
+    """At most ``count`` of ``points`` (k, d), the most central first, then each the farthest from those before it."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -5,6 +5,7 @@ from igl import predicates
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, normals
+from fem_reference.geometry.boxes import boxes_of, touching
 
 
 def self_intersections(surface: Surface) -> Ints:
@@ -28,23 +29,15 @@ def self_crossings(surface: Surface) -> Ints:
 
 def crossings(one: Surface, other: Surface) -> Ints:
     """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly, by predicates of Shewchuk 1997."""
-    low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
-    high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
-    near = [_reaching(surface, low, high) for surface in (one, other)]
+    near = touching(boxes_of(one), boxes_of(other))
     if not all(map(len, near)):
         return np.zeros((0, 2), np.int64)
-    chosen = [np.array(surface.triangles[some]) for surface, some in zip((one, other), near, strict=True)]
-    _, pairs, _ = predicates.find_intersections(np.array(one.points), chosen[0], np.array(other.points), chosen[1])
+    points = [
+        surface.points[surface.triangles[some]].reshape(-1, 3) for surface, some in zip((one, other), near, strict=True)
+    ]
+    corners = [np.arange(len(part)).reshape(-1, 3) for part in points]
+    _, pairs, _ = predicates.find_intersections(points[0], corners[0], points[1], corners[1])
     return np.stack([some[pairs[:, i]] for i, some in enumerate(near)], axis=1)
-
-
-def _reaching(surface: Surface, low: Floats, high: Floats) -> Ints:
-    """The triangles (k,) whose bounding boxes reach into the box from ``low`` to ``high``."""
-    found, (a, b, c) = np.ones(len(surface.triangles), bool), surface.triangles.T
-    for axis, values in enumerate(surface.points.T):
-        for side in (values >= low[axis], values <= high[axis]):
-            found &= side[a] | side[b] | side[c]
-    return np.flatnonzero(found)
 
 
 def overlaps(one: Floats, other: Floats) -> Floats:

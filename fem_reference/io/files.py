@@ -84,7 +84,7 @@ def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Po
 
 def read_points(path: Path) -> Floats:
     """The points (n, 3) of a VTK file with cells of any kind."""
-    return np.asarray(_attempt(vtk.read_points, path, "a VTK file, whole"), float)
+    return np.asarray(_attempt(vtk.data_set, path, "a VTK file, whole").points, float)
 
 
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:

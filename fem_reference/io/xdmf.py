@@ -60,12 +60,8 @@ def _check_dataset(file: Any, place: str) -> None:
         if not isinstance(file[above].get(step.rpartition("/")[2], getlink=True), h5py.HardLink):
             raise ValueError(f'"{step}", a link to elsewhere')
     dataset = file[place]
-    if (
-        not isinstance(dataset, h5py.Dataset)
-        or dataset.external
-        or dataset.is_virtual
-        or dataset.dtype.kind not in "fiu"
-    ):
+    own = isinstance(dataset, h5py.Dataset) and not (dataset.external or dataset.is_virtual)
+    if not own or dataset.dtype.kind not in "fiu":
         raise ValueError(f'"{place}", which is no array of numbers in this file')
     if dataset.size > _MOST:
         raise ValueError(f'{dataset.size} numbers at "{place}", more than {_MOST}')

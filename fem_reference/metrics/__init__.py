@@ -18,6 +18,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
+from fem_reference.problems.fibre_ends import FibreEnds, attached_ends
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.setup import Bone, Joint, Setup
 from fem_reference.runs.store import Run
@@ -117,7 +118,8 @@ class Worst:
 class MeasurementContext:
     """The common context of all measurements of a case: ``areas`` (n,) [mm2] around the surface's vertices at rest, the ``fibres``
     at rest, the ``extension`` of a surface's displacement to their points, ``travel`` [mm], the greatest displacement of the
-    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, and the ``joints``.
+    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, the ``joints``, and the
+    ``ends`` of the fibres, None without attachments.
     """
 
     areas: Floats
@@ -127,6 +129,7 @@ class MeasurementContext:
     bones: tuple[Bone, ...]
     exempt: Exemption
     joints: tuple[Joint, ...] = ()
+    ends: FibreEnds | None = None
 
     @classmethod
     def of(
@@ -173,7 +176,8 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if reference.fibres is None:
         place = f"{reference.name}: fibres"
         raise InputError(place, "a run without an interior", "a reference that carries the fibres")
-    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
+    context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
+    return replace(context, ends=attached_ends(setup.attached, context.exempt, reference.fibres))
 
 
 class Metric(Protocol):

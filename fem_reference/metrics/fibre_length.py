@@ -1,7 +1,8 @@
 """Lengths of the fibres of a run against those of the reference, frame by frame.
 
 Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of both
-go through the measurement context's extension, so that like is compared with like. A run of lines alone (a line of action) has its
+go through the measurement context's extension, so that like is compared with like. Fibres that go on beyond the muscle by straight
+tendons are as long as both. A run of lines alone (a line of action) has its
 own points in place of the fibres'. Its whole length is compared, so it deviates at rest already where a straight line is shorter
 than the fibre. That counts as its error, even if its change of length from rest is correct.
 """
@@ -12,6 +13,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.problems.fibre_ends import ends_of
 from fem_reference.runs.store import Run
 
 _TITLE = "Fibre length"
@@ -43,8 +45,8 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
     """
     found, expected = both_lengths(run, reference, context)
-    longer = found - expected
-    return _statistics(longer, "") + _statistics(100 * longer / context.fibres.lengths(), "_percent")
+    longer, at_rest = found - expected, lengths_at(context.fibres.points, run.numbers[0], context)
+    return _statistics(longer, "") + _statistics(100 * longer / at_rest, "_percent")
 
 
 def both_lengths(run: Run, reference: Run, context: MeasurementContext) -> tuple[Floats, Floats]:
@@ -58,6 +60,14 @@ def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:
     rms = np.sqrt(np.mean(longer**2, axis=1))
     values = {"mean": longer.mean(axis=1), "rms": rms, "max": np.abs(longer).max(axis=1)}
     return measures("fibre_length", {f"{name}{suffix}": each for name, each in values.items()}, _worst(longer))
+
+
+def fibre_points(run: Run, context: MeasurementContext) -> Floats:
+    """Positions of the points of the fibres, (f, m, 3) [mm]: from the run itself, or carried by its surface."""
+    own = run.fibre_positions
+    if own is not None and own.shape[1:] == context.fibres.points.shape:
+        return own
+    return np.stack([context.extension.apply(points) for points in run.positions])
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -86,12 +96,24 @@ def _carries(run: Run, context: MeasurementContext) -> bool:
 def _direct(run: Run, context: MeasurementContext) -> Floats:
     """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points."""
     assert run.fibre_positions is not None  # the caller asked _carries
-    return np.array([context.fibres.lengths(points) for points in run.fibre_positions])
+    return np.array([lengths_at(*at, context) for at in zip(run.fibre_positions, _bones_at(run), strict=True)])
 
 
 def _extended(run: Run, context: MeasurementContext) -> Floats:
     """Length of each fibre in each frame (f, k) [mm], on points that the surface carries along."""
-    return np.array([context.fibres.lengths(context.extension.apply(points)) for points in run.positions])
+    carried = map(context.extension.apply, run.positions)
+    return np.array([lengths_at(*at, context) for at in zip(carried, _bones_at(run), strict=True)])
+
+
+def _bones_at(run: Run) -> tuple[int, ...]:
+    """The frame number by frame at which bones are where the ``run`` has them: the first for the rest state."""
+    return run.numbers[:1] * len(run.numbers) if run.solver == "rest" else run.numbers
+
+
+def lengths_at(points: Floats, number: int, context: MeasurementContext) -> Floats:
+    """Length (k,) [mm] of each fibre with its tendons, its points at ``points`` (n, 3) [mm] at frame ``number``."""
+    inside = context.fibres.lengths(points)
+    return inside if context.ends is None else inside + context.ends.beyond(ends_of(context.fibres, points), number)
 
 
 def _worst(deviations: Floats) -> tuple[str, ...]:

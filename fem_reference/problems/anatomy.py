@@ -14,6 +14,7 @@ from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibre_templates import contours, mapped
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
+from fem_reference.geometry.flux_fibres import area_flux, streamlines
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.skins import edge_lengths
@@ -46,6 +47,19 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
     path = case.file(outline.file, f"{key}.outline.file")
     patches = draped(_patches(path, outline, join(case.place, f"{key}.outline.clouds")), bone_surface)
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
+
+
+def tendon_of(case: MuscleCase, i: int) -> Floats | None:
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None where it has none."""
+    if (tendon := case.attachment[i].tendon) is None:
+        return None
+    key = f"attachment[{i}].tendon"
+    path = case.file(tendon.file, f"{key}.file")
+    clouds = _clouds(path, tendon.unit)
+    if tendon.cloud not in clouds:
+        want = f"one of {', '.join(sorted(clouds))}"
+        raise InputError(join(case.place, f"{key}.cloud"), f'"{tendon.cloud}", which {path} does not have', want)
+    return np.array(clouds[tendon.cloud]).mean(axis=0)
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
@@ -165,14 +179,18 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case as their source has them, in part outside the ``surface``, and their direction at any point: that of
-    the nearest, or of a Laplace field. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
+    the nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
-    field = fibre_field(mesh, *case.fibres.ends.values())
-    if (traced := case.fibres.traced) is not None:
+    traced, ends = case.fibres.traced, case.fibres.ends.values()
+    if traced is not None and traced.flux == "area":
+        flux = area_flux(mesh, *ends)
+        return streamlines(flux, traced.count), flux.field
+    field = fibre_field(mesh, *ends)
+    if traced is not None:
         return trace(field, traced.count), field
     asked = case.fibres.kohout_kukacka
     assert asked is not None  # a Fibres record has one source

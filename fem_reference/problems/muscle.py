@@ -41,7 +41,7 @@ from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
-from fem_reference.problems.anatomy import facets_under, fibres_of, pick
+from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
@@ -52,6 +52,7 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
+from fem_reference.problems.fibre_ends import attached_ends, completed
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
@@ -164,10 +165,14 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
+    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    if case.fibres.complete and ends is not None:
+        fibres = inside(rest.surface, completed(fibres, ends))
+        ends = attached_ends(rest.attached, rest.exempt, fibres)
     asked = (*case.effects, *(one.effect for one in case.decisions))
     needed = fibre if any("fibre" in effect.needs for effect in asked) else None
     problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
-    facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known
+    facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known | ({} if ends is None else ends.facts)
     return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
 
@@ -244,7 +249,8 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
             got = f"vertex {vertices[taken[vertices]][0]}, which another attachment has"
             raise InputError(place, got, "each vertex once")
         taken[vertices] = True
-        attached.append(AttachedVertices(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
+        bone, tendon = by_name[attachment.bone], tendon_of(case, i)
+        attached.append(AttachedVertices(attachment.name, bone, vertices, attachment.stiffness, tendon))
     return tuple(attached)
 
 

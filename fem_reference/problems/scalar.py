@@ -32,10 +32,9 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them
-    (the vertices, then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of
-    each cell above the mean y; ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the greatest
-    mesh Peclet number; ``exact`` the formula of the solution where known.
+    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices,
+    then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
+    ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
     mesh: FieldMesh
@@ -56,6 +55,7 @@ class FieldProblem:
     bones: ClassVar[tuple[()]] = ()
     exempt: ClassVar[None] = None
     joints: ClassVar[tuple[()]] = ()
+    attached: ClassVar[tuple[()]] = ()
 
     @property
     def field(self) -> "FieldProblem":

@@ -82,12 +82,15 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]."""
+    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]; ``tendon`` (3,)
+    [mm]: the point of the bone at rest to which fibres go on that end beside them, if any.
+    """
 
     attachment: str
     bone: Bone
     vertices: Ints
     stiffness: float | None = None
+    tendon: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

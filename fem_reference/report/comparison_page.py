@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment import second_check
+from fem_reference.assessment import experiments, second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
 from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.error_bars import ErrorBar
@@ -66,6 +66,7 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "bars": known(comparison),
         "spread": spread(comparison),
         "error": error and error.worst,
+        "model_band": experiments.model_band() if comparison.error_bars and comparison.scene.task == "solve" else (),
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,
         "label": partial(label, comparison.scene, comparison.setup),

@@ -22,7 +22,7 @@ DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in describ
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
 SPREAD = (
     "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them "
-    "(5.3 and 8.8 % on two muscles of the hip): the error bars of forces and moments leave that out"
+    "(5.3 and 8.8 % on two muscles of the hip): the error bars of forces and moments leave that out, and state it as another model"
 )
 
 
@@ -112,7 +112,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row a frame; ``model``: by how much exact attachments change the statistic, where they are springs."""
+    """One row a frame; ``model``: by how much another model of springs changes the statistic."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
     model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [

@@ -28,16 +28,16 @@ _ROW = 0.175  # height of a row of the overview [in]
 def page(verification: Verification) -> Page:
     """The page of the results of entries."""
     results = verification.results
-    passed = f"{len(results) - len(verification.failed)} of {len(results)} pass"
+    judged = {name: [one for one in group if one in verification.judged] for name, group in verification.groups.items()}
     contents = {
         "verification": verification,
         "kinds": Counter(one.entry.kind for one in results),
         "share": share,
         "spent": duration(math.fsum(one.seconds for one in results)),
-        "overview": overview(verification.groups),
+        "overview": overview(shown) if (shown := {name: group for name, group in judged.items() if group}) else None,
         "ladders": [convergence(one) for one in results if drawable(one)],
     }
-    said = (("", verification.word, passed),)
+    said = (("", verification.word, ", ".join(filter(None, (verification.passed, verification.beside)))),)
     title = "Verification: problems whose answers are known"
     return Page("verification", title, said, "verify_page.html", contents, facts(verification))
 
@@ -64,8 +64,9 @@ def facts(verification: Verification) -> dict[str, Any]:
     """All of it as valid JSON: a number that is not finite is None."""
     return {
         "verdict": verification.word,
-        "passed": len(verification.results) - len(verification.failed),
-        "of": len(verification.results),
+        "passed": sum(one not in verification.failed for one in verification.judged),
+        "of": len(verification.judged),
+        "experiments": verification.beside,
         "seconds": verification.seconds,
         "versions": verification.versions,
         "entries": rows(verification.results),

@@ -23,6 +23,7 @@ from fem_reference.export import forces
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.io.texts import finite
 from fem_reference.metrics import MeasurementContext
+from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report.at_frames import motions
 from fem_reference.runs.store import Run, at_numbers
@@ -61,7 +62,7 @@ class Fields:
     @np.errstate(over="ignore", invalid="ignore")
     def points(self, run: Run) -> Floats:
         """Positions (f, m, 3) [mm] of the fibre points drawn in a run, NaN in a frame that is not known."""
-        found = np.array(local_fields.fibre_points(run, self.context)[:, self.lines[1]])
+        found = np.array(fibre_points(run, self.context)[:, self.lines[1]])
         found[~(np.abs(found) < _FAR).all(axis=(1, 2))] = np.nan
         return at_numbers(run, found, self.numbers)
 

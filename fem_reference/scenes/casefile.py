@@ -1,6 +1,5 @@
 """case.toml -> Case: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
 
-import re
 from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
@@ -16,6 +15,7 @@ from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
 from fem_reference.io import texts
+from fem_reference.scenes import numbers, ranges
 from fem_reference.scenes.case import HOME, Case
 from fem_reference.scenes.muscle import Frames, MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -67,8 +67,7 @@ def _scene_file(case: str | Path) -> Path:
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
     """Change a key of a scene, or ``add`` one to a table that it has."""
-    parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *parents, last = [int(part) if part.isdecimal() and len(part) < 10 else part for part in parts]
+    *parents, last = numbers.parts(key)
     inside: Any = table
     try:
         for part in parents:
@@ -177,6 +176,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     if isinstance(case, MuscleCase):
         _check_names(case)
         _check_rest(case)
+        ranges.check(case)
     return case
 
 

@@ -21,11 +21,16 @@ class PolylineFile(Record):
 
 
 class Traced(Record):
-    """Fibres traced along the gradient of a Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
+    """Fibres traced along the gradient of a Laplace field from the attachment ``start`` to ``end``.
+
+    With a ``flux`` by ``"area"`` the same flux passes each mm2 of an attachment, and fibres cover both. Without, the field is 0 on
+    the start and 1 on the end, and fibres gather at the rims of wide attachments.
+    """
 
     count: int = Field(gt=0, le=100_000)
     start: str
     end: str
+    flux: Literal["area"] | None = None
 
 
 class KohoutKukacka(Record):
@@ -59,12 +64,17 @@ class Chmd(Record):
 
 
 class Fibres(Record):
-    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``."""
+    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
+
+    ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, go on in the muscle or along its surface
+    to the nearest point of it.
+    """
 
     polylines: PolylineFile | None = None
     traced: Traced | None = None
     kohout_kukacka: KohoutKukacka | None = None
     chmd: Chmd | None = None
+    complete: bool = False
 
     _check = one_of("polylines", "traced", "kohout_kukacka", "chmd")
 

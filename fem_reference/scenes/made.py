@@ -8,7 +8,7 @@ from fem_reference.effects import find, name_of, names
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import path, said
 from fem_reference.foundations.records import Record
-from fem_reference.foundations.units import unit_of, written
+from fem_reference.foundations.units import field_unit, kinds, written
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.casefile import made
 from fem_reference.scenes.muscle import MuscleCase
@@ -45,23 +45,12 @@ def _effect(entry: Any) -> Any:
 def _with_units(annotation: Any, value: Any, unit: str = "") -> Any:
     """``value`` with every number as text with its unit, where a field of the records in ``annotation`` wants that."""
     if isinstance(value, Mapping):
-        records = [kind for kind in _kinds(annotation) if isinstance(kind, type) and issubclass(kind, Record)]
+        records = [kind for kind in kinds(annotation) if isinstance(kind, type) and issubclass(kind, Record)]
         fields = {name: field for record in records for name, field in record.model_fields.items()}
         return {
-            key: _with_units(fields[key].annotation, one, _unit(fields[key])) if key in fields else one
+            key: _with_units(fields[key].annotation, one, field_unit(fields[key])) if key in fields else one
             for key, one in value.items()
         }
     if isinstance(value, list | tuple) and not unit:
         return [_with_units(annotation, one) for one in value]
     return value if value is None else written(value, unit)
-
-
-def _unit(field: Any) -> str:
-    """The unit of a field, which stands with its type, or with one of several."""
-    inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in _kinds(field.annotation))
-    return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
-
-
-def _kinds(annotation: Any) -> list[Any]:
-    """A type and all that it is made of."""
-    return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in _kinds(part))]

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.effects import Effect
+from fem_reference.foundations.limits import Range
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
@@ -186,9 +187,18 @@ class Outline(Record):
     reach: PositiveLength
 
 
+class Landmarks(Record):
+    """The middle of a ``cloud`` of landmarks in a file."""
+
+    file: str
+    unit: LengthUnit
+    cloud: str
+
+
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
-    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly.
+    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
+    a straight ``tendon`` to a point of the bone: in their lengths only, it does not pull.
     """
 
     name: Name
@@ -197,6 +207,7 @@ class Attachment(Record):
     vertices: VertexList | None = None
     within: PositiveLength | None = None
     outline: Outline | None = None
+    tendon: Landmarks | None = None
 
     _check = one_of("vertices", "within", "outline")
 
@@ -227,6 +238,12 @@ class Frames(Record):
         return tuple(range(self.first, self.last + 1, self.every))
 
 
+class Uncertain(Range):
+    """The range of a number of the case, by its ``key`` such as ``effect[0].mu``, in place of the one that its effect states."""
+
+    key: str
+
+
 class MuscleCase(Case):
     """The case of a muscle. Its key ``effects`` (``choice``) says whether all effects that are listed act, or those of
     them that the case needs: "auto".
@@ -239,6 +256,7 @@ class MuscleCase(Case):
     attachment: tuple[Attachment, ...] = ()
     fibres: Fibres
     frames: Frames
+    uncertain: tuple[Uncertain, ...] = ()
 
     task = "solve"
     carries = frozenset({"surface", "lines"})

@@ -20,13 +20,9 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 def names(task: Task | None = None) -> list[str]:
     """The names of all solvers in scene files, or of those for a ``task``."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not _is_shared(module.name))
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    found = [name for name in found if name != "common" and not name.endswith("_kernels")]  # these serve solvers
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
-
-
-def _is_shared(module: str) -> bool:
-    """True for a ``module`` of this folder that is no solver but serves some."""
-    return module == "common" or module.endswith("_kernels")
 
 
 def offers(name: str) -> tuple[Solver[Any, Any], ...]:
@@ -87,9 +83,8 @@ def takes_effects(name: str) -> bool:
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
     """Raise InputError below ``place`` where ``settings`` do not suit the ``effects``."""
     offer = find(name, place, task)
-    suits = offer.check_effects if isinstance(offer, MuscleSolver) else None
-    if suits is not None:
-        suits(settings, effects, place)
+    if isinstance(offer, MuscleSolver) and offer.check_effects is not None:
+        offer.check_effects(settings, effects, place)
 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:

@@ -98,7 +98,8 @@ class GlobalStep:
         """The system with the rows of attached vertices removed, or kept for least squares."""
         everything, matrix = np.arange(len(cells.rest)), laplacian(cells).tocsr()
         free = np.setdiff1d(everything, attached)
-        columns, loose = matrix[:, free], _untied(matrix, attached)
+        columns, part = matrix[:, free], connected_components(matrix != 0, directed=False)[1]
+        loose = np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else attached[:0]
         pick = sparse.eye_array(len(everything), format="csr")[free] if fixed == "remove" else columns.T.tocsr()
         solvable = 0 < len(free) < len(everything) and len(loose) == 0
         factor = factorised(pick @ columns) if solvable else None
@@ -149,14 +150,13 @@ class Alternation(MovingSurface):
 
     def frame(self, number: int) -> Frame:
         """The surface and its energy."""
-        scalars = {"arap_energy_mm2": least_energy(self.points, self.system.cells)}
-        return replace(super().frame(number), scalars=scalars)
+        energy = least_energy(self.points, self.system.cells)
+        return replace(super().frame(number), scalars={"arap_energy_mm2": energy})
 
     def ending(self) -> Outcome:
         """Out of steps where a frame did not meet the tolerance."""
-        done = (
-            f"{self.setup.frames[-1] - self.setup.frames[0]} frames in {self.cost['local_global_steps']:.0f} iterations"
-        )
+        frames = self.setup.frames[-1] - self.setup.frames[0]
+        done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
             advice = "more iterations may help; without a tolerance their number is the method"
             return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
@@ -249,19 +249,8 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
     return matrix
 
 
-def _untied(matrix: Any, attached: Ints) -> Ints:
-    """The vertices that no chain of edges of a weight other than 0 leads to an attached one; none where nothing is attached."""
-    part = connected_components(matrix != 0, directed=False)[1]
-    return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)
-
-
-_REPORTED = {
-    "weights": "clamped cotangent",
-    "fixed": "remove",
-    "rotations": "each",
-    "volume_step": False,
-    "iterations": 4,
-}
+_REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": False}
+_REPORTED |= {"iterations": 4}
 # The second row is scaled by eq. 5.9 after each iteration, section 6.2.
 _TABLE = (
     TableRow("ARAP", "arap", _REPORTED),

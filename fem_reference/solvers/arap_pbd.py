@@ -96,7 +96,10 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
         if (far := farthest(moved - minimum)) > np.cbrt(rest.six_volumes / 6):
             why = f"the nearest positions of the volume at rest are {far:.3g} mm away"
             return Relaxed(points, count, False, Trouble("diverged", why))
-    return Relaxed(points, count, met or tolerance is None, _lost_volume(points, rest, settings))
+    ratio = volume(points, rest.triangles)[0] / rest.six_volumes
+    kept = not settings.volume_constraint or abs(ratio - 1) <= _KEPT
+    lost = Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
+    return Relaxed(points, count, met or tolerance is None, None if kept else lost)
 
 
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
@@ -146,14 +149,6 @@ def projected(points: Floats, rest: PbdConstraints, projections: Projections) ->
     for _ in range(projections.sweeps):
         sweep(moved, rest, projections.stretch, projections.volume, projections.bending)
     return moved
-
-
-def _lost_volume(points: Floats, rest: PbdConstraints, settings: ArapPbdSettings) -> Trouble | None:
-    """The trouble with the volume of ``points``; None without, or where nobody asked."""
-    ratio = volume(points, rest.triangles)[0] / rest.six_volumes
-    if not settings.volume_constraint or abs(ratio - 1) <= _KEPT:
-        return None
-    return Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
 
 
 _EXAMPLE = {"weights": "clamped cotangent", "iterations": 3, "volume_constraint": True}

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Polylines
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.winding import Winding
 from fem_reference.geometry.wrapping import Paths
@@ -78,8 +78,10 @@ class Shortest:
         if wrong:
             self.wrong = Trouble("diverged", wrong)
         else:
-            self.found = _frame(passed, paths, number, self.problem.fibres)
-            self.found.scalars.update(self._forces(passed, paths))
+            points = paths.at(passed.part, passed.share)  # as many as the fibres have
+            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # cut off by chords
+            scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
+            self.found = Frame(number, None, fibres=points, scalars=scalars)
 
     def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:
         """Force [N] of lines, mean length of fibres over the optimal one, forces on bones."""
@@ -130,13 +132,6 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
 def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
     """The lengths (k,) [mm] of lines from those of their parts."""
     return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
-
-
-def _frame(passed: Passed, paths: Paths | Winding, number: int, fibres: Polylines) -> Frame:
-    """The lines with as many points as the fibres have; ``lost_by_chords_max`` [mm]: the greatest length that chords cut off."""
-    points = paths.at(passed.part, passed.share)
-    lost = float((_lengths(passed, paths) - fibres.lengths(points)).max())
-    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost})
 
 
 def _on_bones(

@@ -48,31 +48,26 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
         values = 0.0 - norms
     if problem.order == 2:  # the listings are linear between vertices
         values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
-    cost = {
-        "seconds_solve": time.perf_counter() - begin,
-        "unknowns": float(len(mesh.points) if components is None else components.size),
-    }
+    unknowns = len(mesh.points) if components is None else components.size
+    cost = {"seconds_solve": time.perf_counter() - begin, "unknowns": float(unknowns)}
     sink(Frame.of_field(problem, values, "as listed", components))
     return Outcome("converged", "as listed", cost)
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request."""
+    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request: of
+    conditions listing 4.1 has 0 at the first node and slope -1 at the last, listing 4.5 values only.
+    """
+    points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:
-        _check_ends(problem, place)
+        slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]
+        if not (fixed[0] == 0 and np.isnan(fixed[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
+            want = "value 0 on the left and slope -1 on the right, as listing 4.1 has"
+            raise InputError(join(place, "boundary"), "other conditions", want)
     elif settings.peclet is not None:
         raise InputError(join(place, "peclet"), settings.peclet, "no peclet: listing 4.5 has none")
     elif problem.fluxes:
         raise InputError(join(place, "boundary"), "a slope", "values only: listing 4.5 has no slopes")
-
-
-def _check_ends(problem: FieldProblem, place: str) -> None:
-    """InputError where the scene wants other conditions than listing 4.1 has: 0 at the first node, slope -1 at the last."""
-    points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
-    slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]
-    if not (fixed[0] == 0 and np.isnan(fixed[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
-        want = "value 0 on the left and slope -1 on the right, as listing 4.1 has"
-        raise InputError(join(place, "boundary"), "other conditions", want)
 
 
 def fem1d(nodes: Floats, peclet: float) -> Floats:

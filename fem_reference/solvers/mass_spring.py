@@ -126,20 +126,16 @@ class MassSpringModel:
         self.points = problem.begin(mesh.points)
         self.previous = self.points.copy()
         self.check = SurfaceCheck(Surface(mesh.points, skin), self.fixed)
-        longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(self.network, self.fixed)
+        stable = stable_time_step(self.network, self.fixed)
+        longest = settings.time_step or SHARE_OF_STABLE * stable
         self.wanted = settings.frame_time / longest
         self.steps = max(1, math.ceil(self.wanted - 1e-9))
         self.time_step = settings.frame_time / self.steps
+        self.advice = "a longer frame_time or more damping may help"
+        if self.time_step > stable:
+            self.advice = f"the time step of {self.time_step:.3g} s is above the stable one of {stable:.3g} s"
         free = len(self.points) - len(self.fixed)
         self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
-
-    @property
-    def advice(self) -> str:
-        """Advice: a stable time step, else settings that bring the masses to rest."""
-        limit = stable_time_step(self.network, self.fixed)
-        if self.time_step > limit:
-            return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
-        return "a longer frame_time or more damping may help"
 
     def move(self, number: int) -> None:
         """Take the steps from the frame number before to ``number``."""
@@ -199,19 +195,15 @@ def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> O
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     quick = settings.model_copy(update={"time_step": settings.frame_time})
     model = timed(MassSpringModel, problem, settings, quick)
-    if model.wanted > _MOST_STEPS:
-        why = Trouble("out of steps", _too_many(model.wanted, settings, model.network))
-        return refused(model, problem.frames[0], sink, why)
-    return follow(model, problem, sink)
-
-
-def _too_many(steps: float, settings: MassSpringSettings, network: Network) -> str:
-    """The reason why nothing was begun: what makes so many ``steps`` of a frame number."""
-    if settings.time_step is not None:
-        return f"{steps:.3g} steps in a frame number, at most {_MOST_STEPS}; a longer time_step may help"
-    what = f"a stiffness of {network.stiffness:.3g} N/mm and a damping of {network.damping:.3g} N s/mm"
-    helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
-    return f"{what} want {steps:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
+    if model.wanted <= _MOST_STEPS:
+        return follow(model, problem, sink)
+    what, helps = "", "a longer time_step may help"
+    if settings.time_step is None:
+        stiffness, damping = model.network.stiffness, model.network.damping
+        what = f"a stiffness of {stiffness:.3g} N/mm and a damping of {damping:.3g} N s/mm want "
+        helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
+    why = f"{what}{model.wanted:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
+    return refused(model, problem.frames[0], sink, Trouble("out of steps", why))
 
 
 _EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}

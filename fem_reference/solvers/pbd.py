@@ -19,18 +19,10 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
+from fem_reference.solvers import pbd_kernels as kernels
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
-from fem_reference.solvers.pbd_kernels import (
-    dihedrals,
-    distances,
-    nearest_segments,
-    project_dihedrals,
-    project_distances,
-    project_volume,
-    volume,
-)
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
 # Segments whose distances differ by less than this share of the size of the muscle are as near.
@@ -102,12 +94,12 @@ class PbdConstraints:
         return cls(
             inverse_masses=inverse_masses,
             edges=edges,
-            lengths=distances(points, edges),
+            lengths=kernels.distances(points, edges),
             share=np.ones(len(edges)),
             triangles=triangles,
-            six_volumes=volume(points, triangles)[0],
+            six_volumes=kernels.volume(points, triangles)[0],
             hinges=hinges,
-            angles=dihedrals(points, hinges),
+            angles=kernels.dihedrals(points, hinges),
         )
 
 
@@ -122,15 +114,13 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle.
 
-        Where two segments of fibres are equally near up to rounding, as at a kink, the first of them counts, so that turning the
-        scene
-    changes nothing.
+    Where two segments of fibres are equally near up to rounding, as at a kink, the first counts: turning the scene changes nothing.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
     within = _AS_NEAR * diagonal(points)
     middles = points[edges].mean(axis=1)
-    nearest = starts[nearest_segments(middles, fibres.points[starts], fibres.points[starts + 1], within)]
+    nearest = starts[kernels.nearest_segments(middles, fibres.points[starts], fibres.points[starts + 1], within)]
     edge, fibre = points[edges[:, 1]] - points[edges[:, 0]], fibres.points[nearest + 1] - fibres.points[nearest]
     lengths = np.linalg.norm(edge, axis=1) * np.linalg.norm(fibre, axis=1)
     return np.asarray(np.minimum(np.abs(np.einsum("ed,ed->e", edge, fibre)) / lengths, 1))
@@ -178,9 +168,9 @@ def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
 
 def sweep(points: Floats, at: PbdConstraints, stretch: float, volume: float, bending: float) -> None:
     """Project all constraints once, each with the stiffness of its kind: ``points`` (n, 3) [mm] move in place."""
-    project_distances(points, at.inverse_masses, at.edges, at.lengths, stretch * at.share)
-    project_volume(points, at.inverse_masses, at.triangles, at.six_volumes, volume)
-    project_dihedrals(points, at.inverse_masses, at.hinges, at.angles, bending)
+    kernels.project_distances(points, at.inverse_masses, at.edges, at.lengths, stretch * at.share)
+    kernels.project_volume(points, at.inverse_masses, at.triangles, at.six_volumes, volume)
+    kernels.project_dihedrals(points, at.inverse_masses, at.hinges, at.angles, bending)
 
 
 def advance(
@@ -201,11 +191,6 @@ def advance(
 
 _EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
-
-def _fibres(settings: PbdSettings) -> bool:
-    return settings.anisotropy is not None
-
-
 # The report's text with the settings of its program.
 _TABLE = TableRow(
     "PBD",
@@ -213,4 +198,12 @@ _TABLE = TableRow(
     {"sub_iterations": 3, "solver_iterations": 1, "damping": 0.01, "stretch": 1.0, "volume": 1.0, "bending": 0.9}
     | {"collision": {"gap": "0 mm", "stiffness": 1.0}},
 )
-SOLVES = (MuscleSolver(settings=PbdSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,), fibres=_fibres),)
+SOLVES = (
+    MuscleSolver(
+        settings=PbdSettings,
+        solve=solve,
+        example=_EXAMPLE,
+        table=(_TABLE,),
+        fibres=lambda settings: settings.anisotropy is not None,
+    ),
+)

@@ -44,22 +44,11 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Outcome, Sink
+from fem_reference.solvers import program_kernels as kernels
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import PbdConstraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances
-from fem_reference.solvers.program_kernels import (
-    angles_of,
-    are_inside,
-    flood,
-    march_out,
-    mark,
-    normals_of,
-    project_edges,
-    project_folds,
-    project_volume,
-    six_volumes,
-)
 
 # The step of time [s]. It cancels but for rounding.
 STEP = 1e-3
@@ -97,8 +86,8 @@ class Voxels:
         points, border = np.array(surface.points), np.zeros((count,) * 3, np.bool_)
         size = np.ptp(points, axis=0) / count
         empty = cls(border, points.min(axis=0), np.where(size > 0, size, 1.0))
-        mark(border, points, empty.places(points), np.array(surface.triangles))
-        return replace(empty, inside=~flood(border))
+        kernels.mark(border, points, empty.places(points), np.array(surface.triangles))
+        return replace(empty, inside=~kernels.flood(border))
 
     def places(self, points: Floats) -> Floats:
         """Points (n, 3) [mm] in voxels from the lower corner."""
@@ -132,11 +121,11 @@ class VoxelBone:
         back, voxels = np.linalg.inv(self.pose), self.voxels
         before, after = apply(back, starts), apply(back, goals)
         first, last = voxels.places(before), voxels.places(after)
-        stuck = are_inside(voxels.inside, first)
-        entered = are_inside(voxels.inside, last) & ~stuck
+        stuck = kernels.are_inside(voxels.inside, first)
+        entered = kernels.are_inside(voxels.inside, last) & ~stuck
         reached[stuck] = apply(self.pose, apply(self.last, before[stuck]))
         displacements = (before - after)[entered] * (1 / voxels.size)
-        ends, too_far = march_out(voxels.inside, last[entered], displacements)
+        ends, too_far = kernels.march_out(voxels.inside, last[entered], displacements)
         reached[entered] = apply(self.pose, np.where(too_far[:, None], before[entered], voxels.points(ends)))
 
 
@@ -156,7 +145,7 @@ def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
     earlier, later = sides[np.argsort(sides[:, 1])].T
     hinges = np.column_stack([starts[later], ends[later], opposite[earlier], opposite[later]])
     pairs = np.column_stack([earlier, later]) // 3
-    return hinges, angles_of(normals_of(points, triangles), pairs)
+    return hinges, kernels.angles_of(kernels.normals_of(points, triangles), pairs)
 
 
 def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
@@ -174,7 +163,7 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
         lengths=distances(points, edges),
         share=share,
         triangles=triangles,
-        six_volumes=six_volumes(points, triangles)[0],
+        six_volumes=kernels.six_volumes(points, triangles)[0],
         hinges=hinges,
         angles=angles,
     )
@@ -214,9 +203,9 @@ class ProgramSurface(MovingSurface):
 
 def project(points: Floats, at: PbdConstraints, bending: float) -> None:
     """One sweep over the constraints, which moves ``points`` (n, 3) [mm] in place."""
-    project_edges(points, at.edges, at.lengths, at.share)
-    project_volume(points, at.triangles, at.six_volumes)
-    project_folds(points, at.hinges, at.angles, bending)
+    kernels.project_edges(points, at.edges, at.lengths, at.share)
+    kernels.project_volume(points, at.triangles, at.six_volumes)
+    kernels.project_folds(points, at.hinges, at.angles, bending)
 
 
 def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Floats:
@@ -229,11 +218,14 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Float
 
 _EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
 
-
-def _fibres(settings: ProgramSettings) -> bool:
-    return settings.anisotropy is not None
-
-
 # The report's program as it is, its settings.
 _TABLE = TableRow("PBD", "pbd_program", {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64})
-SOLVES = (MuscleSolver(settings=ProgramSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,), fibres=_fibres),)
+SOLVES = (
+    MuscleSolver(
+        settings=ProgramSettings,
+        solve=solve,
+        example=_EXAMPLE,
+        table=(_TABLE,),
+        fibres=lambda settings: settings.anisotropy is not None,
+    ),
+)

@@ -114,13 +114,14 @@ class RbfMuscle(MovingSurface):
         rest, vertices = setup.surface, setup.attached_vertices
         self.settings, self.fitted = settings, fit(rest, settings.gaussians)
         self.level, _, self.shares = self.fitted.level(rest.points)
-        self.handles = [
-            entry.vertices[farthest_points(rest.points[entry.vertices], _HANDLES)] for entry in setup.attached
-        ]
+        parts = [entry.vertices for entry in setup.attached]
+        self.handles = [part[farthest_points(rest.points[part], _HANDLES)] for part in parts]
         self.cloud = Cloud.of(self.fitted.centres, rest.points[np.concatenate(self.handles)])
         away, nearest = cKDTree(rest.points[vertices]).query(rest.points)
         self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
-        self.along = _along(setup, self.cloud.nodes)
+        first, last = (rest.points[setup.attached[i].vertices].mean(axis=0) for i in (0, -1))
+        direction = (last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny)
+        self.along = np.broadcast_to(direction, self.cloud.nodes.shape)  # from the first attachment to the last
         self.volume = enclosed_volume(rest.points, rest.triangles)
         self.nodes = self.cloud.nodes
         self.cost["unknowns"] = 4.0 * settings.gaussians
@@ -167,28 +168,17 @@ class RbfMuscle(MovingSurface):
             points += self.beside[:, None] * (bony - points)[self.nearest]
             carry(points, self.setup, number)  # exactly, however far the surface of the Gaussians was
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
-        if self.settings.volume:
-            points += self._missing_volume(points)
+        if self.settings.volume:  # free vertices give back along its gradient what the radii left over
+            six, gradient = volume(points, self.setup.surface.triangles)
+            gradient[self.setup.attached_vertices] = 0
+            points += gradient * (6 * self.volume - six) / float((gradient**2).sum())
         if self.settings.contact:
             points += self._pushes(points, number)
         return points
 
-    def _missing_volume(self, points: Floats) -> Floats:
-        """The displacement (n, 3) of free vertices along the gradient of the volume that gives back what radii left over."""
-        six, gradient = volume(points, self.setup.surface.triangles)
-        gradient[self.setup.attached_vertices] = 0
-        return gradient * (6 * self.volume - six) / float((gradient**2).sum())
-
     def ending(self) -> Outcome:
         """Converged, as every state is found by formulas."""
         return Outcome("converged", f"{self.settings.gaussians} Gaussians, {4 * self.settings.gaussians} parameters")
-
-
-def _along(setup: Setup, nodes: Floats) -> Floats:
-    """Unit vectors (k, 3) at ``nodes`` (k, 3) from the middle of the first attachment to that of the others."""
-    first = setup.surface.points[setup.attached[0].vertices].mean(axis=0)
-    last = setup.surface.points[setup.attached[-1].vertices].mean(axis=0)
-    return np.broadcast_to((last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny), nodes.shape)
 
 
 def solve(setup: Setup, settings: RbfSettings, sink: Sink) -> Outcome:

@@ -71,9 +71,7 @@ class About(Record):
 
 
 def about(path: Path) -> About:
-    """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; nothing where there is no
-    ``candidate.toml``.
-    """
+    """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; an empty record without one."""
     file = _about_file(path)
     if not os.path.lexists(file):
         return About()
@@ -171,7 +169,9 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
     elif source.suffix.lower() == ".pvd":
         entries = ((_number(time, interval), path.name, path) for time, path in files.read_pvd(source))
     else:
-        entries = ((_number_in(path), path.name, path) for path in _visible(source))
+        meshes = [path for path in _visible(source) if path.suffix.lower() in files.surface_suffixes()]
+        last = {path: re.findall(r"\d+", path.stem)[-1:] for path in meshes}  # digits of their names
+        entries = ((int(digits[0]), path.name, path) for path, digits in last.items() if digits)
     found: dict[int, tuple[str, Path | Surface]] = {}
     for number, name, frame in entries:
         if number in found:
@@ -179,12 +179,6 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
         if number is not None:
             found[number] = (name, frame)
     return {number: frame for number, (_, frame) in found.items()}
-
-
-def _number_in(path: Path) -> int | None:
-    """The last digits in the name of a mesh file."""
-    digits = re.findall(r"\d+", path.stem)
-    return int(digits[-1]) if digits and path.suffix.lower() in files.surface_suffixes() else None
 
 
 def _number(time: float, interval: float | None) -> int | None:
@@ -233,23 +227,16 @@ def _turned(triangles: Ints) -> Ints:
 
 def _welded(soup: Surface, rest: Surface) -> Floats:
     """Points (n, 3) [mm] of the vertices of ``rest`` from triangles that share none, in the order of its own."""
-    orders = (
-        _weld(soup.points, triangles, len(rest.points)) for triangles in (rest.triangles, rest.triangles[:, ::-1])
-    )
-    points, gap, vertex = min(orders, key=lambda one: one[1])
+    points, found = np.full(rest.points.shape, np.nan), []
+    for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
+        points[vertices] = soup.points
+        gaps = np.linalg.norm(points[vertices] - soup.points, axis=1)  # of corners from the last one at their vertex
+        found.append((float(gaps.max()), int(vertices[gaps.argmax()]), points.copy()))
+    gap, vertex, points = min(found, key=lambda one: one[0])
     if gap > SAME_POINT:
         got = f"corners of vertex {vertex} that are {gap:.3g} mm apart"
         raise InputError(soup.place, got, f"the triangles of {rest.place} in their order")
     return points
-
-
-def _weld(corners: Floats, triangles: Ints, count: int) -> tuple[Floats, float, int]:
-    """Points (count, 3) from corners (3 m, 3), how far [mm] a corner is from its point at most, and from which."""
-    vertices = triangles.ravel()
-    points = np.full((count, 3), np.nan)
-    points[vertices] = corners
-    gaps = np.linalg.norm(points[vertices] - corners, axis=1)
-    return points, float(gaps.max()), int(vertices[gaps.argmax()])
 
 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:

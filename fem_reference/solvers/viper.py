@@ -23,20 +23,12 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.solvers import viper_kernels as kernels
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
-from fem_reference.solvers.viper_kernels import (
-    matrices,
-    product,
-    project_bend,
-    project_stretch,
-    project_volume,
-    unit,
-    volumes,
-)
 
 # Neighbours of a rod in its bundle, and points of rods that carry a vertex.
 _AROUND, _CARRIERS = 6, 12
@@ -105,12 +97,10 @@ class Rods(MovingSurface):
         inside = enclosed_volume(problem.surface.points, problem.surface.triangles)
         self.radius = float(np.sqrt(inside / np.pi / np.linalg.norm(self.steps, axis=2).sum()))
         self.bundle = Bundle(rest, self.radius)
-        self.rods, self.radii = (
-            problem.begin(rest.reshape(-1, 3)).reshape(rest.shape),
-            np.full(rest.shape[:2], self.radius),
-        )
+        self.rods = problem.begin(rest.reshape(-1, 3)).reshape(rest.shape)
+        self.radii = np.full(rest.shape[:2], self.radius)
         self.turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(rest), settings.points + 1, 1))
-        self.volumes = volumes(rest, self.radii)
+        self.volumes = kernels.volumes(rest, self.radii)
         self.ends = [nearest_bones(problem, rest[:, end], "viper") for end in (0, -1)]
         self.last = problem.frames[0]
         self.fibres = problem.begin(fibres.points)
@@ -140,7 +130,7 @@ class Rods(MovingSurface):
         share, between = (np.linspace(0, 1, self.settings.points + i)[:, None] for i in (0, 1))
         first, last = (self._moved(ends, number) for ends in self.ends)
         self.rods = (1 - share) * first[0] + share * last[0]
-        self.turns = unit((1 - between) * first[1] + between * last[1])
+        self.turns = kernels.unit((1 - between) * first[1] + between * last[1])
         for ends, i in zip(self.ends, (0, -1), strict=True):
             self.rods[:, i] = [apply(self.problem.bones[n].pose(number), self.rest[k, i]) for k, n in enumerate(ends)]
         self.last = number
@@ -153,26 +143,24 @@ class Rods(MovingSurface):
             step = bone.pose(number) @ np.linalg.inv(bone.pose(self.last))
             quaternion = Rotation.from_matrix(step[:3, :3]).as_quat(canonical=True, scalar_first=True)
             points[ends == n] = apply(step, self.rods[ends == n].reshape(-1, 3)).reshape(-1, *points.shape[1:])
-            turns[ends == n] = product(quaternion, self.turns[ends == n])
+            turns[ends == n] = kernels.product(quaternion, self.turns[ends == n])
         return points, turns
 
     def _sweep(self) -> None:
-        """Project all constraints once."""
         chosen = self.settings
-        project_stretch(self.rods, self.turns, self.steps, chosen.stretch)
-        project_bend(self.turns, chosen.bending)
+        kernels.project_stretch(self.rods, self.turns, self.steps, chosen.stretch)
+        kernels.project_bend(self.turns, chosen.bending)
         points, radii = self.bundle.goals(self.rods, self.radii, self._frames())
         self.rods[:, 1:-1] += chosen.bundle * (points - self.rods)[:, 1:-1]
         self.radii += chosen.bundle * (radii - self.radii)
-        project_volume(self.rods, self.radii, self.volumes, chosen.volume)
-        flat = self.rods.reshape(-1, 3)
-        move_out(flat, self.bones, 1.0)
+        kernels.project_volume(self.rods, self.radii, self.volumes, chosen.volume)
+        move_out(self.rods.reshape(-1, 3), self.bones, 1.0)
 
     def _frames(self) -> Floats:
         """The rotation (k, p, 3, 3) at each point, in the middle between those of its segments."""
         before, after = self.turns[:, :-1], self.turns[:, 1:]
         sign = np.where(np.sum(before * after, axis=2, keepdims=True) < 0, -1.0, 1.0)
-        return matrices(unit(before + sign * after))
+        return kernels.matrices(kernels.unit(before + sign * after))
 
     def _carry(self, number: int) -> None:
         """Move surface and fibres with the rods, each point of which turns and scales what is around it."""
@@ -186,7 +174,7 @@ class Rods(MovingSurface):
 
     def frame(self, number: int) -> Frame:
         """Surface and fibres; scalars: the volume of the rods over that at rest, the least and the greatest of the segments."""
-        ratio = volumes(self.rods, self.radii) / self.volumes
+        ratio = kernels.volumes(self.rods, self.radii) / self.volumes
         scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
 

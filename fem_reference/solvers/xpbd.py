@@ -19,18 +19,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from fem_reference.foundations import units
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas, vertex_areas
 from fem_reference.foundations.records import Record
-from fem_reference.foundations.units import (
-    AreaStiffness,
-    BendingStiffness,
-    Density,
-    Length,
-    PositivePressure,
-    Rate,
-    Stiffness,
-    Time,
-)
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones
@@ -45,8 +36,8 @@ class XpbdCollision(Record):
     ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
     """
 
-    gap: Annotated[Length, Field(ge=0)]
-    stiffness: AreaStiffness
+    gap: Annotated[units.Length, Field(ge=0)]
+    stiffness: units.AreaStiffness
 
 
 class XpbdSettings(Record):
@@ -61,14 +52,14 @@ class XpbdSettings(Record):
     ``collision``: contact with bones.
     """
 
-    frame_time: Time
+    frame_time: units.Time
     sub_steps: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
     sweeps: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
-    density: Density
-    stretch: Stiffness | None = None
-    bending: BendingStiffness | None = None
-    volume: PositivePressure | None = None
-    damping: Rate | None = None
+    density: units.Density
+    stretch: units.Stiffness | None = None
+    bending: units.BendingStiffness | None = None
+    volume: units.PositivePressure | None = None
+    damping: units.Rate | None = None
     collision: XpbdCollision | None = None
 
 
@@ -103,13 +94,10 @@ class XpbdConstraints:
         # The compiled functions know writable arrays only.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        areas = triangle_areas(points, hinges[:, [0, 1, 2]]) + triangle_areas(
-            points, hinges[:, [0, 1, 3]]
-        )  # of both triangles
+        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
         slender = distances(points, hinges) ** 2 / areas
-        stretched, bent, filled = (
-            slice(None if stiffness else 0) for stiffness in (settings.stretch, settings.bending, settings.volume)
-        )
+        stiffnesses = settings.stretch, settings.bending, settings.volume
+        stretched, bent, filled = (slice(None if stiffness else 0) for stiffness in stiffnesses)
         return cls(
             inverse_masses=inverse_masses(surface, attached, settings.density),
             edges=np.ascontiguousarray(hinges[stretched, :2]),

@@ -98,23 +98,32 @@ def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
 def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
     """Each choice of centres on each attached area with enough vertices."""
     for entry in setup.attached:
-        points = setup.surface.points[entry.vertices]
-        middle = points.mean(axis=0)
-        flat = (points - middle) @ np.linalg.svd(points - middle, full_matrices=False)[2].T
-        known, asked = flat[::2], flat[1::2]
-        for count in (count for count in CENTRES if 2 * count <= len(known)):
-            shape = np.sqrt(count) / float(np.ptp(flat[:, 0]))
-            for choice, centres in _centres(known[:, :2], known[:, 2], count, shape):
-                found = radial_basis.radial_sum(known[:, :2], known[:, 2], centres, shape, terms=_POLYNOMIAL)
-                rms = float(np.sqrt(np.mean((found(asked[:, :2]) - asked[:, 2]) ** 2)))
+        flat = _flat(setup.surface.points[entry.vertices])
+        for count in (count for count in CENTRES if 2 * count <= len(flat[::2])):
+            # In radii of the Gaussians, so that condition numbers do not depend on the unit of length.
+            places, heights = flat[:, :2] * np.sqrt(count) / float(np.ptp(flat[:, 0])), flat[:, 2]
+            known, asked = places[::2], places[1::2]
+            for choice, centres in _centres(known, heights[::2], count):
+                found = radial_basis.radial_sum(known, heights[::2], centres, 1.0, terms=_POLYNOMIAL)
+                rms = float(np.sqrt(np.mean((found(asked) - heights[1::2]) ** 2)))
                 yield HeightError(case, entry.attachment, choice, count, rms, found.condition)
 
 
-def _centres(points: Floats, heights: Floats, count: int, shape: float) -> Iterator[tuple[str, Floats]]:
+def _flat(points: Floats) -> Floats:
+    """Points (n, 3) of an area about their middle in its own axes, the last across it, in order along the first: whatever the
+    axes of the scene and the numbers of the points. The third moment along each axis is positive.
+    """
+    away = points - points.mean(axis=0)
+    flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
+    flat *= np.where((flat**3).sum(axis=0) < 0, -1, 1)
+    return np.asarray(flat[np.argsort(flat[:, 0], kind="stable")])
+
+
+def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str, Floats]]:
     """The centres (count, 2) by each choice of the report's section 3.5.1."""
     yield "grid", radial_basis.grid_centres(points, count)
     yield "Halton", radial_basis.halton_centres(points, count)
-    yield "greedy", radial_basis.greedy_centres(points, heights, count, shape, terms=_POLYNOMIAL)
+    yield "greedy", radial_basis.greedy_centres(points, heights, count, 1.0, terms=_POLYNOMIAL)
     yield "features", radial_basis.feature_centres(points, heights, count)
 
 

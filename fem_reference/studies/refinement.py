@@ -136,7 +136,8 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     base, sizes = coarser(bench.scene)
     larger, varied = f"tetrahedra of {sizes[1]:.3g} mm", needed(bench, reference)
     scenes = {larger: base} | {name: vary(base) for name, vary in varied.items()}
-    if model and any(entry.stiffness is not None for entry in base.attachment):
+    springs = any(entry.stiffness is not None for entry in base.attachment)
+    if model and springs:
         attached = tuple(entry.model_copy(update={"stiffness": None}) for entry in base.attachment)
         scenes[_EXACT] = base.model_copy(update={"attachment": attached})
     # Newton's method takes less than quadratic time of the unknowns: what larger tetrahedra save is at least their number.
@@ -155,7 +156,9 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     if not _tets(coarse) < _tets(reference):
         got = f"meshes of {_tets(reference):.0f} and {_tets(coarse):.0f} tetrahedra"
         raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that coarser meshes differ from")
-    return Pair(reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench))
+    return Pair(
+        reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench), springs
+    )
 
 
 def safety(bench: Bench[MuscleCase]) -> float:

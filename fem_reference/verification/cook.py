@@ -48,11 +48,8 @@ class Panel:
         membrane = getattr(cook, self.name)
         faces = {face: face for face in ("x0", "x1", "z0", "z1")}
         mesh = shapes.mapped([shapes.Brick(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
-        pull = f"0, {membrane.traction * self.share}, 0 MPa"
-        acting = (
-            *neo_hooke(membrane.shear * self.shear, membrane.bulk * self.bulk, self.element),
-            make("traction", on="x1", force=pull, ramp=ramp()),
-        )
+        pull = make("traction", on="x1", force=f"0, {membrane.traction * self.share}, 0 MPa", ramp=ramp())
+        acting = *neo_hooke(membrane.shear * self.shear, membrane.bulk * self.bulk, self.element), pull
         return Body(mesh, acting, (*clamped("x0"), *sliding("z0", "z1")), (0.0, 1.0))
 
 
@@ -93,9 +90,7 @@ SOURCE = "validation/cook.py: finite elements of degree 6 to 10 of our own in nu
 MEMBRANE = partial(Entry, group="Cook's membrane", kind="second solver", source=SOURCE)
 LINEAR = control("linear tetrahedra without a pressure", element="P1")
 LINEAR_HEXAHEDRA = control("linear hexahedra without a pressure", element="Q1")
-SOFTER = control(
-    "Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus", shear=1.4**-1 * 4 / 3, bulk=5 / 3
-)
+SOFTER = control("Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus", shear=4 / 3 / 1.4, bulk=5 / 3)
 LOCKING = control("Poisson's ratio is 0.4999, at the same Young's modulus: it locks", **NEARLY)
 STIFF = control("the shear modulus is 2 % too high", shear=1.02)
 SMALL_STRAIN = control("small strain, by linear extrapolation of a tiny load", share=SMALL)

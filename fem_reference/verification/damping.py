@@ -76,9 +76,7 @@ def block_creep(lab: Lab, n: int, eta: float) -> float:
 
 def halved(counts: tuple[int, ...], seconds: float, name: str) -> Refinement:
     """Load steps of ``seconds / count``, by which implicit Euler finds the quantity ``name``."""
-    note = (
-        f"{name} by implicit Euler, whose sizes are seconds of a load step; the value is extrapolated from the last two"
-    )
+    note = f"{name} by implicit Euler; sizes are seconds of a load step, the value is extrapolated from the last two"
     return Refinement(counts, seconds, order=1, extrapolated=True, note=note)
 
 

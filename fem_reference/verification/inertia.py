@@ -30,9 +30,8 @@ def mass(factor: float = 1.0, spectral_radius: float = 0.9) -> Effect:
 
 def weight(axis: int, acceleration: float) -> Effect:
     """Gravity along an axis [mm/s^2], at once."""
-    vector = ", ".join(f"{acceleration if i == axis else 0.0!r}" for i in range(3))
     at_once = [{"frame": 0.0, "amount": 1.0}]
-    return make("gravity", density=DENSITY, acceleration=f"{vector} mm/s^2", ramp=at_once)
+    return make("gravity", density=DENSITY, acceleration=(acceleration * np.eye(3)[axis]).tolist(), ramp=at_once)
 
 
 def fallen(lab: Lab, factor: float) -> float:
@@ -90,11 +89,10 @@ PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FR
 
 def more(lab: Lab, periods: float, factor: float) -> float:
     """The force [N] of inertia after a quarter of a pull by 1e-4 of the length in so many ``periods`` of the first mode."""
-    forces = []
-    for acting in ((), (mass(factor),)):
-        body = bar(acting, (Prescribed("x1", "x1", (0,), PULL),), FRAMES, periods * PERIOD)
-        forces.append(float(lab.solve(body, "P2", **STEP, residual=1e-14).states[16].forces["x1"][0]))
-    return forces[1] - forces[0]
+    pulled = (Prescribed("x1", "x1", (0,), PULL),)
+    bodies = [bar(acting, pulled, FRAMES, periods * PERIOD) for acting in ((), (mass(factor),))]
+    without, moving = (lab.solve(body, "P2", **STEP, residual=1e-14).states[16].forces["x1"][0] for body in bodies)
+    return float(moving - without)
 
 
 def slow(lab: Lab, factor: float) -> Finding:

@@ -8,23 +8,13 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Turn
 from fem_reference.runs.store import Run
+from fem_reference.verification import parts
 from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, Specimen, stretch_entry
-from fem_reference.verification.parts import (
-    SURFACE,
-    SYMMETRY,
-    clamped,
-    control,
-    farthest,
-    find,
-    neo_hooke,
-    ramp,
-    sliding,
-)
 
-loads = find("loads")
+loads = parts.find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
 LARGE = (100.0, 50.0, 60.0)  # of a block of muscle of 300 ml [mm]
@@ -38,23 +28,17 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 def weight(density: float, times: float = 1.0) -> Effect:
     """Gravity along -z, ``times`` that of the earth, on ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
-    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=ramp())
+    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 
 
 def pressed(pressure: float) -> Effect:
     """A fluid of ``pressure`` [MPa] on the region "wet"."""
-    return make("pressure", on="wet", pressure=f"{pressure} MPa", ramp=ramp())
+    return make("pressure", on="wet", pressure=f"{pressure} MPa", ramp=parts.ramp())
 
 
 def dead(nominal: float) -> Effect:
     """A force per area at rest along x on the face x1 [MPa]."""
-    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=ramp())
-
-
-def wet_block(faces: tuple[str, ...]) -> Cells:
-    """A block with a region "wet" of some of its faces."""
-    mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
-    return replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in faces])})
+    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=parts.ramp())
 
 
 def loaded(
@@ -65,35 +49,37 @@ def loaded(
     frames: int = 1,
     bulk: float = BULK,
 ) -> Run:
-    """The states of a block under a ``load``, up to so many ``frames``."""
-    body = Body(wet_block(wet), (*neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
+    """The states of a block, with some of its faces ``wet``, under a ``load``, up to so many ``frames``."""
+    mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
+    mesh = replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in wet])})
+    body = Body(mesh, (*parts.neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
     return lab.solve(body, "P2/P1", **STEPS)
 
 
 def reaction(lab: Lab, density: float) -> float:
     """The force [N] on the base to which a standing block is glued."""
     mesh = shapes.box((3, 2, 2), LARGE, "tetrahedron")
-    body = Body(mesh, (*neo_hooke(MU, BULK), weight(density)), clamped("z0"), (0, 1))
+    body = Body(mesh, (*parts.neo_hooke(MU, BULK), weight(density)), parts.clamped("z0"), (0, 1))
     return float(lab.solve(body, "P2/P1", first_step=0.25, residual=1e-10).last.forces["z0"][2])
 
 
 def top(lab: Lab, cells: int, element: str) -> float:
     """The displacement of the top of the column [mm], with a number of cells along its height."""
     mesh = shapes.box((1, 1, cells), (2.0, 2.0, HEIGHT), ELEMENTS[element][0])
-    acting = (*neo_hooke(MU, SOFT, element), weight(MUSCLE, WEIGHT / (MUSCLE * FREE_FALL)))
-    body = Body(mesh, acting, sliding("x0", "x1", "y0", "y1", "z0"), (0, 1))
+    acting = (*parts.neo_hooke(MU, SOFT, element), weight(MUSCLE, WEIGHT / (MUSCLE * FREE_FALL)))
+    body = Body(mesh, acting, parts.sliding("x0", "x1", "y0", "y1", "z0"), (0, 1))
     return float(lab.solve(body, element, **STEPS).last.points[:, 2].max()) - HEIGHT
 
 
 def shrunk(lab: Lab, pressure: float) -> float:
     """V/V0 of a block in a fluid of ``pressure`` [MPa], free to shrink on its planes of symmetry."""
-    solved = loaded(lab, ("x1", "y1", "z1"), pressed(pressure), SYMMETRY, bulk=COMPRESSIBLE)
+    solved = loaded(lab, ("x1", "y1", "z1"), pressed(pressure), parts.SYMMETRY, bulk=COMPRESSIBLE)
     return solved.last.scalars["volume_ratio"]
 
 
 def left_over(lab: Lab, faces: tuple[str, ...]) -> float:
     """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
-    ends = (*clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), TILT))
+    ends = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), TILT))
     forces = loaded(lab, faces, pressed(2 * MU), ends).last.forces
     return float(np.linalg.norm(forces["z0"] + forces["z1"]))
 
@@ -102,7 +88,7 @@ def turned(lab: Lab, load: Effect) -> float:
     """A block leans under a ``load``, then its base is turned by a quarter circle: the distance to itself turned [mm]."""
     solved = loaded(lab, ("x1",), load, (Prescribed("z0", "z0", (0, 1, 2), QUARTER),), frames=2)
     before = solved.states[1].points
-    return farthest(solved.last.points, before + QUARTER(before, 2))
+    return parts.farthest(solved.last.points, before + QUARTER(before, 2))
 
 
 LOAD = partial(Entry, group="loads")
@@ -115,7 +101,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         measure=reaction,
         given={"density": MUSCLE},
-        **control("The density of fat instead of muscle.", density=FAT),
+        **parts.control("The density of fat instead of muscle.", density=FAT),
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
         because="The forces of a discrete equilibrium sum to zero whatever the mesh, but for the residual: it is 1e-10 N as a root "
@@ -129,7 +115,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm",
         measure=top,
         given={"element": "Q2"},
-        **control("Linear instead of quadratic elements (Q1).", element="Q1"),
+        **parts.control("Linear instead of quadratic elements (Q1).", element="Q1"),
         truth=lambda: loads.column_top(MU, SOFT, WEIGHT, HEIGHT),
         within=1e-8,
         relative=True,
@@ -144,7 +130,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=shrunk,
         given={"pressure": FLUID},
-        **control("The fluid's pressure 1 % too high.", pressure=1.01 * FLUID),
+        **parts.control("The fluid's pressure 1 % too high.", pressure=1.01 * FLUID),
         truth=lambda: loads.pressed_volume(COMPRESSIBLE, FLUID),
         within=1e-12,
         relative=True,
@@ -158,8 +144,8 @@ ENTRIES: tuple[Entry, ...] = (
         title="Tilted block in a fluid that presses all round: what its two holders carry together",
         unit="N",
         measure=left_over,
-        given={"faces": SURFACE},
-        **control("The top is dry.", faces=SURFACE[:-1]),
+        given={"faces": parts.SURFACE},
+        **parts.control("The top is dry.", faces=parts.SURFACE[:-1]),
         truth=0.0,
         within=1e-12,
         because="A pressure on a closed surface has no resultant, on a discrete one either, but for the residual: 1e-13 N may add "
@@ -173,7 +159,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm",
         measure=turned,
         given={"load": pressed(0.2 * MU)},
-        **control("A dead load of the same size.", load=dead(-0.2 * MU)),
+        **parts.control("A dead load of the same size.", load=dead(-0.2 * MU)),
         truth=0.0,
         within=1e-10,
         because="A pressure turns with the surface, but for the residual: 1e-13 N may add up to 1e-12 N, and the block that stands "
@@ -188,6 +174,6 @@ ENTRIES: tuple[Entry, ...] = (
         "Block pulled by a dead force: how far it stretches",
         PULLED,
         "The force spread over the area as it is now.",
-        loads=(make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=ramp()),),
+        loads=(make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=parts.ramp()),),
     ),
 )

@@ -32,9 +32,8 @@ def find(name: str) -> ModuleType:
     0.1406
     """
     if TRUTHS.name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            TRUTHS.name, TRUTHS / "__init__.py", submodule_search_locations=[str(TRUTHS)]
-        )
+        places, file = [str(TRUTHS)], TRUTHS / "__init__.py"
+        spec = importlib.util.spec_from_file_location(TRUTHS.name, file, submodule_search_locations=places)
         assert spec is not None  # a file that ends in .py always has one
         assert spec.loader is not None
         sys.modules[TRUTHS.name] = package = importlib.util.module_from_spec(spec)

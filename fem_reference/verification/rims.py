@@ -50,10 +50,8 @@ def body(level: int, grading: float, *, plane: bool) -> Body:
 
 def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
     """The order of the clamped half's force [N], from the differences of three levels: no truth of the force is needed."""
-    solved = [
-        lab.solve(body(level, grading, plane=plane), ELEMENT, first_step=1.0, residual=1e-13) for level in range(3)
-    ]
-    values = [float(one.last.forces["clamped"][0]) for one in solved]
+    bodies, settings = [body(level, grading, plane=plane) for level in range(3)], {"first_step": 1.0, "residual": 1e-13}
+    values = [float(lab.solve(one, ELEMENT, **settings).last.forces["clamped"][0]) for one in bodies]
     first, second = abs(values[1] - values[0]), abs(values[2] - values[1])
     found = float(np.log2(first / second)) if first > 0 and second > 0 else np.nan
     return Finding(found, note=", ".join(f"{value:.7g} N" for value in values))
@@ -64,6 +62,9 @@ CONTROLS = {
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
 PLANE = "the coarsest of three meshes has 4 cells to a side: over two finer ones it is"
+ON_PLANE = "A patch clamped in plane strain: order of its force, uniform quadratic hexahedra"
+ON_BLOCK = "A patch clamped on a block that is free at its ends: order of its force, uniform quadratic hexahedra"
+GRADED_TOO = "The same on meshes graded towards the rim"
 SPACE = "the coarsest of three meshes has 3 cells to a side, and one along the rim, whose ends add their own error"
 
 ENTRIES = tuple(
@@ -82,27 +83,9 @@ ENTRIES = tuple(
         source="validation/rims.py: Williams 1952",
     )
     for name, grading, within, title, because in (
-        (
-            "rim_plane",
-            UNIFORM,
-            0.1,
-            "A patch clamped in plane strain: order of its force, uniform quadratic hexahedra",
-            f"{PLANE} 0.006 nearer",
-        ),
-        (
-            "rim_plane_graded",
-            GRADED,
-            0.2,
-            "The same on meshes graded towards the rim, h ~ r^(1/2)",
-            f"{PLANE} 0.1 nearer",
-        ),
-        (
-            "rim_block",
-            UNIFORM,
-            0.2,
-            "A patch clamped on a block that is free at its ends: order of its force, uniform quadratic hexahedra",
-            SPACE,
-        ),
-        ("rim_block_graded", GRADED, 0.4, "The same on meshes graded towards the rim", SPACE),
+        ("rim_plane", UNIFORM, 0.1, ON_PLANE, f"{PLANE} 0.006 nearer"),
+        ("rim_plane_graded", GRADED, 0.2, f"{GRADED_TOO}, h ~ r^(1/2)", f"{PLANE} 0.1 nearer"),
+        ("rim_block", UNIFORM, 0.2, ON_BLOCK, SPACE),
+        ("rim_block_graded", GRADED, 0.4, GRADED_TOO, SPACE),
     )
 )

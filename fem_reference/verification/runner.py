@@ -91,9 +91,7 @@ def run(
         for _ in range(labs):
             free.put(stack.enter_context(make_lab()))
         found = [pool.submit(work, entry) for entry in wanted]
-        stack.callback(
-            lambda: [one.cancel() for one in found]
-        )  # so that no thread goes on to the next while the labs close
+        stack.callback(lambda: [one.cancel() for one in found])  # no thread goes on to the next while the labs close
         for one in wait(found, return_when=FIRST_EXCEPTION).done:
             one.result()
     return tuple(one.result() for one in found)
@@ -111,14 +109,8 @@ def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
         return result(entry, finding, seconds, with_negative_control=with_negative_control)
     except FAILURES as error:
         notes = [finding.note, f"no truth, {type(error).__name__}: {error}"]
-        return Result(
-            entry,
-            replace(finding, note="; ".join(filter(None, notes))),
-            math.nan,
-            math.nan,
-            seconds,
-            with_negative_control,
-        )
+        explained = replace(finding, note="; ".join(filter(None, notes)))
+        return Result(entry, explained, math.nan, math.nan, seconds, with_negative_control)
 
 
 def _log_progress(last: Result, done: int, wanted: int, passed: float) -> None:

@@ -19,20 +19,10 @@ from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Affine, Along, Rest, Turn
 from fem_reference.runs.store import Frame
-from fem_reference.verification import fibres
+from fem_reference.verification import fibres, parts
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import (
-    NO_GRADIENT,
-    SYMMETRY,
-    clamped,
-    control,
-    farthest,
-    neo_hooke,
-    ramp,
-    resistance,
-)
 from fem_reference.verification.patch import patch
 
 
@@ -66,7 +56,7 @@ def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
     energies, and of forces and moments over their greatest.
     """
     return {
-        "positions": farthest(second.points, first.points) / farthest(first.points, rest),
+        "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
         "energy": abs(second.scalars["energy"] / first.scalars["energy"] - 1),
         "forces": _difference(first.forces, second.forces),
         "moments": _difference(first.moments, second.moments),
@@ -82,7 +72,7 @@ def built(
     acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
 ) -> Body:
     """A body whose ``acting`` effects stand beside a resistance to volume change; ``mesh`` by kind of its cells."""
-    acting = (*acting, resistance(element, 1.0))
+    acting = (*acting, parts.resistance(element, 1.0))
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
 
@@ -95,15 +85,15 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
     mesh = shapes.box((3, 3, 7), (10.0, 10.0, 25.0), "tetrahedron")
     passive = make("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4)
     turned = Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5)))
-    acting = (*neo_hooke(0.01, 10.0), passive)
-    body = Body(mesh, acting, (*clamped("z0"), turned), (0.0, 1.0), Along((0.0, 0.0, 1.0)))
+    acting = (*parts.neo_hooke(0.01, 10.0), passive)
+    body = Body(mesh, acting, (*parts.clamped("z0"), turned), (0.0, 1.0), Along((0.0, 0.0, 1.0)))
     settings: dict[str, Any] = {"linear_solver": solver, "precision": precision, "residual": residual}
     return lab.solve(body, "P2/P1", first_step=0.25, **settings).last.points
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
     """The largest distance [mm] of a node from its place by the direct solver in double precision."""
-    return farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
+    return parts.farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 
 NEO_HOOKE = make("neo_hooke", mu="10 kPa")
@@ -111,24 +101,25 @@ MOONEY_RIVLIN = make("mooney_rivlin", c1="3 kPa", c2="2 kPa")
 GUCCIONE = make("guccione", c="2 kPa", bf=8.0, bt=2.0, bfs=4.0)
 HOLZAPFEL_OGDEN = make("holzapfel_ogden", k1="5 kPa", k2=1.0, angle="30 deg", normal=[1.0, 0.0, 0.0])
 PASSIVE = make("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4)
-ACTIVE = make("fibre_active", stress="20 kPa", optimal_stretch=1.0, ramp=ramp())
+ACTIVE = make("fibre_active", stress="20 kPa", optimal_stretch=1.0, ramp=parts.ramp())
 FEBIO = make("fibre_passive_febio", c3="5 kPa", c4=5.0, c5="300 kPa", linear_from=1.3)
-TENSION = make("active_tension", tension="5 kPa", ramp=ramp())
-PRESTRETCH = make("prestretch", stretch=1.1, ramp=ramp())
-WEIGHT = make("gravity", density="1060 kg/m3", acceleration="9.81, 0, -500 m/s^2", ramp=ramp())
-FLUID = make("pressure", on="x1", pressure="1 kPa", ramp=ramp())
+TENSION = make("active_tension", tension="5 kPa", ramp=parts.ramp())
+PRESTRETCH = make("prestretch", stretch=1.1, ramp=parts.ramp())
+WEIGHT = make("gravity", density="1060 kg/m3", acceleration="9.81, 0, -500 m/s^2", ramp=parts.ramp())
+FLUID = make("pressure", on="x1", pressure="1 kPa", ramp=parts.ramp())
 
 BAR = partial(shapes.box, (2, 2, 4), (1.0, 1.0, 2.0))
 SHORT_BAR = partial(shapes.box, (1, 1, 2), (1.0, 1.0, 2.0))
 BLOCK = partial(shapes.warped_box, (2, 2, 2), (1.0, 1.0, 1.0))
 CURVED_BLOCK = partial(BLOCK, degree=2)
 # Bends and twists at once: an axis between that of the bar, z, and one across it.
-TURNED = (*clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))))
-STANDING = (*clamped("z0"), Prescribed("y0", "y0", (1,), Rest(), stiffness=0.01))
-PULLED = (*SYMMETRY, Prescribed("z1", "z1", (2,), Affine(NO_GRADIENT, (0.0, 0.0, 0.6))))
+TURNED = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))))
+STANDING = (*parts.clamped("z0"), Prescribed("y0", "y0", (1,), Rest(), stiffness=0.01))
+PULLED = (*parts.SYMMETRY, Prescribed("z1", "z1", (2,), Affine(parts.NO_GRADIENT, (0.0, 0.0, 0.6))))
 
 REMAINS = "Newton's residual of 1e-14 N, at forces of about 1e-3 N, and rounding remain"
-SAME_RULE = f"both integrate by the same Gauss-Legendre rule, so that {REMAINS}"
+ALIKE = "both integrate by the same Gauss-Legendre rule, so that"
+SAME_RULE = f"{ALIKE} {REMAINS}"
 CONSTANT = f"F is constant in a cell, so that every rule is exact: {REMAINS}"
 BAR_RULES = (
     "they integrate by different rules, here of degree 9; by P2/P1 this bar differs by 3e-6 with those of degree 4, 3e-7 with 6, "
@@ -168,14 +159,7 @@ STEEPER = Tolerance(
 )
 BENT = "bent and twisted at once"
 LEANING = "under its weight and a fluid that presses on one side, leaning on springs"
-
-
-BY_GAUSS = Tolerance(
-    1e-9,
-    "both integrate by the same Gauss-Legendre rule, so that Newton's residual of 1e-8 N, at forces of 50 N, remains",
-    1e-8,
-    5,
-)
+BY_GAUSS = Tolerance(1e-9, f"{ALIKE} Newton's residual of 1e-8 N, at forces of 50 N, remains", 1e-8, 5)
 
 
 def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
@@ -187,7 +171,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, toler
         unit="1",
         measure=agreement,
         given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
-        **control("in scikit-fem the first modulus is 1 % too large", error=0.01),
+        **parts.control("in scikit-fem the first modulus is 1 % too large", error=0.01),
         truth=0.0,
         within=tolerance.within,
         because=tolerance.because,
@@ -203,6 +187,7 @@ def specimen(name: str, words: str, block: Specimen) -> Entry:
 
 ACTIVE_BLOCK = Specimen(NEO + fibres.active(0.1), "P2/P1", "pulled", MU, loads=(dead(MU),))
 FAMILIES = Specimen(fibres.FAMILIES, "P2/P1", "equibiaxial", 1.25)
+SHORTENED, SHEARED = Specimen(MOONEY, "Q1/P0", "planar", 0.7), Specimen(HEART, "P2/P1", "simple_shear", 0.3)
 MUSCLE, LOADED = (NEO_HOOKE, PASSIVE, ACTIVE), (NEO_HOOKE, WEIGHT, FLUID)
 TAUT = (NEO_HOOKE, FEBIO, TENSION, PRESTRETCH)
 BENT_P1 = f"A neo-Hookean bar with a penalty on its volume, {BENT}"
@@ -222,7 +207,7 @@ LAGGED = Entry(
     unit="mm",
     measure=difference,
     given={"solver": "lagged", "precision": "double"},
-    **control("Newton's method ends at a residual of 1e-2 N.", residual=1e-2),
+    **parts.control("Newton's method ends at a residual of 1e-2 N.", residual=1e-2),
     truth=0.0,
     within=1e-9,
     because="Both end where the residual is below 1e-11 N, far below it as a rule; where the bar is softest (some 0.006 N/mm) that "
@@ -234,12 +219,8 @@ LAGGED = Entry(
 ENTRIES: tuple[Entry, ...] = (
     specimen("uniaxial", "with passive fibres, stretched along them", fibres.muscle(fibres.passive(), 1.6)),
     specimen("equibiaxial", "with two families of fibres, stretched alike along two axes", FAMILIES),
-    specimen(
-        "planar", "of Mooney-Rivlin material, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)
-    ),
-    specimen(
-        "simple_shear", "of Guccione's heart muscle in simple shear", Specimen(HEART, "P2/P1", "simple_shear", 0.3)
-    ),
+    specimen("planar", "of Mooney-Rivlin material, shortened with its width fixed", SHORTENED),
+    specimen("simple_shear", "of Guccione's heart muscle in simple shear", SHEARED),
     specimen("pulled", "with active fibres, pulled by a dead force", ACTIVE_BLOCK),
     specimen("febio", "with FEBio's fibres, stretched along them", fibres.muscle(fibres.passive_febio(), 1.6)),
     specimen("tension", "with fibres of constant tension, fixed short", fibres.muscle(fibres.tension(), 0.9)),

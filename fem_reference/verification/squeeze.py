@@ -96,9 +96,8 @@ def collapses(lab: Lab, element: str, poisson: float) -> Finding:
     solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
     ended = solved.outcome.status in ("collapsed", "diverged", "limit point")
-    message = solved.outcome.message
-    found = ended and least >= 0.2 and "incompressible is outside the range" in message
-    return Finding(float(found), note=f"{solved.outcome.status}: {message}")
+    found = ended and least >= 0.2 and "incompressible is outside the range" in solved.outcome.message
+    return Finding(float(found), note=f"{solved.outcome.status}: {solved.outcome.message}")
 
 
 def outside(lab: Lab, element: str, poisson: float) -> Finding:
@@ -123,20 +122,18 @@ def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) ->
 
 
 def _end_note(solved: Run, height: float) -> str:
-    last = solved.states[-1]
+    number, at = solved.states[-1].number, solved.states[-1].scalars
     return (
-        f"{solved.outcome.status}: {solved.outcome.message}. "
-        f"Last state kept at {1 - (1 - height) * last.number:.3f} of the height: "
-        f"det F at least {last.scalars['min_det_F_quadrature']:.3f} at quadrature points, "
-        f"{last.scalars['min_det_F_vertices']:.3f} at vertices, V/V0 {last.scalars['volume_ratio']:.5f}"
+        f"{solved.outcome.status}: {solved.outcome.message}. Last state kept at {1 - (1 - height) * number:.3f} of the height: "
+        f"det F at least {at['min_det_F_quadrature']:.3f} at quadrature points, {at['min_det_F_vertices']:.3f} at vertices, "
+        f"V/V0 {at['volume_ratio']:.5f}"
     )
 
 
 def inverts(lab: Lab, element: str, count: int, height: float) -> Finding:
     """1 where the squeeze ends as inverted in a state that Newton's method accepts, else 0."""
     solved = glued(lab, element, count, height)
-    outcome = solved.outcome
-    found = outcome.status == "inverted" and "Newton's method converged" in outcome.message
+    found = solved.outcome.status == "inverted" and "Newton's method converged" in solved.outcome.message
     return Finding(float(found), note=_end_note(solved, height))
 
 
@@ -151,18 +148,10 @@ def stays_upright(lab: Lab, element: str, count: int, height: float, **settings:
 EXACT = "the state is homogeneous, so that every element has it: Newton's residual of 1e-11 N and rounding remain"
 BALANCE = "validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)"
 # A property that is there (1) or not (0).
-YES = partial(
-    Entry, unit="1", truth=1.0, within=0.1, because="it is yes (1) or no (0), and nothing between", kind="property"
-)
-SMOOTH = partial(
-    Entry,
-    group="squeeze",
-    negative_control="bulk modulus 1 % too small",
-    within=1e-10,
-    because=EXACT,
-    kind="closed form",
-    source=BALANCE,
-)
+NOTHING_BETWEEN = "it is yes (1) or no (0), and nothing between"
+YES = partial(Entry, unit="1", truth=1.0, within=0.1, because=NOTHING_BETWEEN, kind="property")
+EXACTLY = partial(Entry, group="squeeze", within=1e-10, because=EXACT, kind="closed form", source=BALANCE)
+SMOOTH = partial(EXACTLY, negative_control="bulk modulus 1 % too small")
 UPRIGHT = "det F above zero everywhere, or material would go through itself"
 GLUED = partial(YES, group="squeeze", source=UPRIGHT)
 
@@ -183,8 +172,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=outside,
         given={"element": "Q1/P0", "poisson": POISSON},
-        negative_control="a Poisson ratio of 0.32",
-        wrong={"poisson": 0.32},  # with which the volume stays above a half
+        **control("a Poisson ratio of 0.32", poisson=0.32),  # with which the volume stays above a half
         truth=known_outside,
         within=0.1,
         because="it is a number of states, each of them homogeneous, so that every element has it",

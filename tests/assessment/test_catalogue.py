@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fem_reference.assessment.catalogue import Finding, Refinement, order, result
+from fem_reference.assessment.catalogue import Finding, Refinement, Verification, order, result
 from tests.verification.stand_ins import entry
 
 
@@ -65,6 +65,39 @@ def test_the_tolerance_is_of_the_size_of_the_truth_where_it_is_relative(relative
     assert (found.truth, found.within, found.word) == (-2.0, within, "pass" if relative else "fail")
     assert found.error == pytest.approx(0.15, abs=1e-15)
     assert result(one, Finding(math.nan), 1.0, with_negative_control=False).word == "fail"
+
+
+@pytest.mark.parametrize(
+    ("value", "truth", "pinned", "word"),
+    [
+        (1.02, 1.0, 1.02, "within"),
+        (1.2, 1.0, 1.2, "outside"),
+        (1.02, 1.0, 1.03, "fail"),  # within, but not what it was
+        (1.2, 1.0, 1.0, "fail"),
+        (0.0, 1.0, 0.0, "outside"),
+        (1e-9, 1.0, 0.0, "fail"),
+        (math.nan, 1.0, 1.0, "fail"),
+        (1.0, math.nan, 1.0, "inconclusive"),
+        (1.02, 1.0, math.nan, "fail"),
+    ],
+)
+def test_an_experiment_is_met_or_not_and_fails_only_where_its_value_has_moved(value, truth, pinned, word) -> None:
+    one = entry("cube", truth=truth, kind="experiment", pinned=pinned)
+    assert result(one, Finding(value), 1.0, with_negative_control=False).word == word
+
+
+def test_a_verification_with_experiments_outside_passes_and_says_how_many_are_met() -> None:
+    ones = [
+        entry("a", truth=1.0),
+        *(entry(name, truth=1.0, kind="experiment", pinned=v) for name, v in (("b", 1.0), ("c", 9.0))),
+    ]
+    found = [
+        result(one, Finding(v), 1.0, with_negative_control=False) for one, v in zip(ones, (1.0, 1.0, 9.0), strict=True)
+    ]
+    whole = Verification(tuple(found), 1.0, {})
+    assert (whole.word, whole.failed) == ("pass", ())
+    assert "1 of 1 pass, 1 of 2 experiments met within their uncertainty" in whole.summary
+    assert "experiments" not in Verification(tuple(found[:1]), 1.0, {}).summary
 
 
 def test_the_order_is_the_slope_of_the_last_two_errors() -> None:

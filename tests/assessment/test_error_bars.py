@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from numpy.testing import assert_array_equal
 
 from fem_reference import metrics
 from fem_reference.assessment import error_bars
@@ -287,24 +288,44 @@ def test_a_stress_whose_difference_is_small_by_chance_is_known_as_well_as_the_ot
             assert (bar.unit, bar.values) == ("kPa", pytest.approx(1.25 * wanted * TIMES, rel=1e-9))
 
 
+def pulled(growth: float, size: float) -> Run:
+    """``size`` [N] a frame along y at 30 mm along z from an axis along x."""
+    force = np.outer(size * TIMES, [0.0, -1, 0])
+    both = {"force": force, "moment": np.cross([0.0, 0, 30], force)}
+    named = {f"{kind}_on_femur_{axis}": both[kind][:, i] for kind in both for i, axis in enumerate("xyz")}
+    return replace(run(growth), scalars=named)
+
+
+def jointed(given: Run) -> MeasurementContext:
+    """A joint that turns the bone about the axis along x."""
+    bone = Bone("femur", REST, RigidMotion((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2)))
+    joint = Joint("hip", bone, np.array([1.0, 0, 0]), np.zeros(3), lambda frame: 0.01 * frame)
+    return MeasurementContext.of(given, FIBRE, (bone,), None, (joint,))
+
+
+@pytest.mark.parametrize(("exact", "force", "moment"), [(None, 9.0, 270.0), (105.0, 9.0, 270.0), (140.0, 30.0, 900.0)])
+def test_another_model_of_springs_is_how_they_are_spread_or_exact_attachments(exact, force, moment) -> None:
+    """Of 100 N a frame 9 %, or what exact attachments change the 110 N of larger tetrahedra by, where that is more. Of nothing
+    else it is known, and the bar stays as it is.
+    """
+    given = Pair(pulled(0.1, 100.0), pulled(0.11, 110.0), (4.0, 8.0), {}, exact and pulled(0.11, exact))
+    known, springs = (error_bars.error_bars(one, jointed(one.fine)) for one in (given, replace(given, springs=True)))
+    for of in ("change", "deviation"):
+        for statistic, wanted in (("force", force), ("moment", moment)):
+            assert springs.find(of, "joint_moment", statistic).model == pytest.approx(wanted * TIMES)
+        for before, bar in zip(known.bars, springs.bars, strict=True):
+            assert_array_equal(bar.values, before.values)
+            if bar.metric != "joint_moment" or bar.statistic == "arm":
+                assert (bar.model is None) == (exact is None)
+
+
 def test_forces_and_moments_have_bars_in_their_own_units() -> None:
     """100 N a frame along y at 30 mm along z from an axis along x, 10 % more on tetrahedra of twice the size: of an error a h^1.5
     the sizes differ by 1.83 a h^1.5; the force, one number at one place, is taken to be of first order, and a fifth less certain.
     The arm is 30 mm on both, and unknown at rest. Without forces there is no bar.
     """
-    motion = RigidMotion((1, 0, 0), (0, 0, 0), tuple(map(float, NUMBERS)), (0.0, 0.1, 0.2))
-    bone = Bone("femur", REST, motion)
-    joint = Joint("hip", bone, np.array([1.0, 0, 0]), np.zeros(3), lambda frame: 0.01 * frame)
-
-    def pulled(growth: float, size: float) -> Run:
-        force = np.outer(size * TIMES, [0.0, -1, 0])
-        both = {"force": force, "moment": np.cross([0.0, 0, 30], force)}
-        named = {f"{kind}_on_femur_{axis}": both[kind][:, i] for kind in both for i, axis in enumerate("xyz")}
-        return replace(run(growth), scalars=named)
-
     runs = Pair(pulled(0.1, 100.0), pulled(0.11, 110.0), (4.0, 8.0), {})
-    context = MeasurementContext.of(runs.fine, FIBRE, (bone,), None, (joint,))
-    found = error_bars.error_bars(runs, context)
+    found = error_bars.error_bars(runs, jointed(runs.fine))
     for of in ("change", "deviation"):
         for statistic, unit, wanted in (("force", "N", 1.2 * 10.0), ("moment", "N mm", 300.0 / LEFT)):
             bar = found.find(of, "joint_moment", statistic)

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from fem_reference.assessment import local_fields
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import MeasurementContext
+from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.runs.store import Outcome, Run
 
 BALL = shapes.sphere(3, 10.0)
@@ -45,8 +46,8 @@ def test_fibres_are_those_of_the_run_or_carried_by_its_surface() -> None:
     grown = run(1.0, 1.5)
     context = MeasurementContext.of(grown, LINES, ())
     bare = replace(grown, fibres=None, fibre_positions=None)
-    assert_allclose(local_fields.fibre_points(grown, context), grown.fibre_positions)
-    assert_allclose(local_fields.fibre_points(bare, context), grown.fibre_positions, atol=1e-9)
+    assert_allclose(fibre_points(grown, context), grown.fibre_positions)
+    assert_allclose(fibre_points(bare, context), grown.fibre_positions, atol=1e-9)
 
 
 def test_stretch_is_of_the_pieces_that_meet_and_of_no_other_line() -> None:

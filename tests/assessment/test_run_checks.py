@@ -85,7 +85,7 @@ def test_contact_gives_way_by_the_pressure_over_its_stiffness(tmp_path) -> None:
     for stiffness, given in ((1.0, 0.5), (10.0, 0.05)):
         contact = effects.make("contact", stiffness=f"{stiffness} MPa/mm", bones=("ball",))
         pressed = replace(problem, effects=(*problem.effects[:2], contact))
-        none, some = (_give(pressed, problem.bones[2], pressure) for pressure in (0.0, 0.5))
+        none, some = (_give(pressed, problem.bones[2], pressure, 1.0) for pressure in (0.0, 0.5))
         assert some - none == pytest.approx(given)
 
 

@@ -13,3 +13,20 @@ def test_a_page_of_cases_without_their_files_is_refused_with_the_reason(
     said = capsys.readouterr().err
     assert "estimation: got no case that can be measured (gluteus_maximus: " in said
     assert "FEM_REFERENCE_DATA" in said
+
+
+def test_a_page_of_all_quantities_takes_no_cases(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (("--case", "hip_flexion"), ("--unit", "mm"), ("--solve",)):
+        assert cli.main(["page", "credibility", *words, "--out", str(tmp_path)]) == 2
+        assert "for credibility" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_without_the_anatomy_moment_arms_are_not_measured(
+    tmp_path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("FEM_REFERENCE_DATA", raising=False)
+    assert cli.main(["page", "credibility", "--out", str(tmp_path), "--quiet"]) == 0
+    printed = capsys.readouterr().out
+    assert "1 not measured" in printed
+    assert "left out: iliacus_anatomical" in printed

@@ -152,7 +152,7 @@ def test_main_job(tmp_path, monkeypatch) -> None:
     assert frames == set(range(0, 201, 10))
     metrics = {row["metric"] for row in facts["measures"] if row["candidate"] == "pbd"}
     surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
-    assert metrics == surface | {"fibre_length", "moment_arm", "penetration"}
+    assert metrics == surface | {"fibre_ends", "fibre_length", "moment_arm", "penetration"}
     page = (tmp_path / "hip_flexion" / "report.html").read_text()
     assert page.count('src="data:image/webp') >= 4, "the pictures are missing"
 

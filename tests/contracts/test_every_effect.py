@@ -3,6 +3,7 @@ expressions take symbols. What the laws say is in test_effect_laws.py.
 """
 
 import operator
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -48,6 +49,14 @@ def test_an_effect_states_an_example_of_all_that_it_needs(name: str) -> None:
     stated, fields = effects.example(name), effects.find(name).model_fields
     assert parse(effects.find(name), stated, name)
     assert {key for key, field in fields.items() if field.is_required()} <= {*stated} <= {*fields}
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_published_ranges_are_of_parameters_that_can_be_read_and_have_a_source(name: str) -> None:
+    for key, one in effects.find(name).published.items():
+        low, high = (getattr(make(name, **{key: end}), key) for end in (one.low, one.high))
+        assert low < high
+        assert re.search(r"\b(19|20)\d\d\b", one.source), "the year of a publication"
 
 
 @pytest.mark.parametrize("name", ELASTIC)
@@ -103,11 +112,12 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPRESSED)
 def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
-    effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
+    effect, near = make(name), np.eye(3) + 0.05 * deformations()[0]
+    both = [uniaxial(stretch) @ near for stretch in (1.6, 0.7)]  # fibres pull in one, what is across them in the other
     for key, _, unit in effect.parameters:
         changed = make(name, **{key: other(type(effect), key, PARAMETERS[name][key])})
         printed = [
-            (np.array(outcome(one, state(F, fibre=ALONG))).tolist(), one.title, one.amount(5))
+            ([np.array(outcome(one, state(F, fibre=ALONG))).tolist() for F in both], one.title, one.amount(5))
             for one in (effect, changed)
         ]
         assert printed[0] != printed[1], key

@@ -20,6 +20,13 @@ def test_ends_are_met_and_a_turned_curve_is_the_curve_turned(name: str) -> None:
     np.testing.assert_allclose(make(2 * POINTS @ turn.T + 5)(t), 2 * make(POINTS)(t) @ turn.T + 5, atol=1e-8)
 
 
+@pytest.mark.parametrize("name", sorted(curves.TECHNIQUES))
+def test_points_in_reverse_give_the_curve_in_reverse(name: str) -> None:
+    make, _ = curves.TECHNIQUES[name]
+    t = np.linspace(0, 1, 12)
+    np.testing.assert_allclose(make(POINTS[::-1])(1 - t), make(POINTS)(t), atol=1e-8)
+
+
 @pytest.mark.parametrize("name", INTERPOLATING)
 def test_interpolating_curves_pass_all_points(name: str) -> None:
     exponent = {"Catmull-Rom, uniform": 0.0, "Catmull-Rom, centripetal": 0.5}.get(name, 1.0)

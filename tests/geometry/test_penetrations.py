@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.motion import apply
 from fem_reference.geometry import penetrations
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.penetrations import Depths, depths, depths_within
@@ -19,6 +20,7 @@ from fem_reference.geometry.tessellation import tessellated
 BODY = shapes.sphere(3, 10.0)
 BALL = Sphere((0, 0, 0), 4.0)
 BONE = tessellated(BALL, BODY.points, "ball")
+STILL = np.eye(4)
 
 
 def posed(*shift: float) -> np.ndarray:
@@ -29,7 +31,7 @@ def posed(*shift: float) -> np.ndarray:
 
 def test_depths_in_a_ball_are_its_radius_less_the_distance_from_the_middle() -> None:
     points = np.random.default_rng(2).normal(size=(500, 3)) * 5
-    found = depths_within(BODY, points)
+    found = depths_within(BODY, points, np.arange(len(BODY.triangles)))
     true = np.maximum(10 - np.linalg.norm(points, axis=1), 0)
     assert found == pytest.approx(true, abs=0.1)
     assert (found <= true + 1e-9).all()
@@ -65,12 +67,54 @@ def test_a_half_space_is_entered_as_deep_as_the_body_reaches_below_it() -> None:
 
 def test_a_depth_at_rest_is_taken_off() -> None:
     places = np.array([[0.0, 0, 0], [1, 0, 0]])
-    deep, place = Depths(np.array([3.0, 2.5]), places).deepest(Depths(np.array([2.0, 0.5]), places))
+    found = Depths(np.array([4, 7]), np.array([3.0, 2.5]), places)
+    deep, place = found.deepest(Depths(np.array([2, 4, 7]), np.array([9.0, 2.0, 0.5]), places[[0, 0, 1]]))
     assert deep == 2.0
     assert place.tolist() == [1, 0, 0]
+    # What was not within at rest counts in full.
+    assert found.deepest(Depths(np.array([7]), np.array([2.0]), places[1:]))[0] == 3.0
 
 
-STILL = np.eye(4)
+@pytest.mark.parametrize("known", [[0], [0, 700], []])
+def test_depths_do_not_depend_on_what_is_known_to_be_near(known) -> None:
+    points = np.random.default_rng(3).normal(size=(200, 3)) * 6
+    every = depths_within(BODY, points, np.arange(len(BODY.triangles)))
+    assert_allclose(depths_within(BODY, points, np.array(known, np.int64)), every, rtol=0, atol=1e-12)
+
+
+def test_a_triangle_without_area_hides_nothing() -> None:
+    # On the edge between two triangles: what is nearest to it is as deep and on the same side.
+    a, b = BODY.triangles[0, :2]
+    sliver = Surface(BODY.points, np.concatenate([BODY.triangles, [[a, b, a]]]))
+    points = np.array([BODY.points[[a, b]].mean(axis=0) * share for share in (0.9, 1.1)])
+    known = np.arange(len(BODY.triangles))
+    assert_allclose(depths_within(sliver, points, known), depths_within(BODY, points, known), atol=1e-12)
+
+
+def test_depths_of_a_body_and_a_bone_turn_with_both() -> None:
+    pose = posed(9.0, 0, 0)
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [3.0, -7.0, 2.0]
+    deep, place = depths(BODY, BONE, BALL, pose).deepest()
+    turned, there = depths(BODY.moved_to(apply(turn, BODY.points)), BONE, BALL, turn @ pose).deepest()
+    assert turned == pytest.approx(deep, abs=1e-9)
+    assert_allclose(there, apply(turn, place[None])[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_parts_of_a_bone_are_inside_however_many_there_are(count) -> None:
+    # Small balls beside each other: every second one is in the body, 1 mm of it 2 mm at least below the surface.
+    small = shapes.sphere(0, 0.5)
+    middles = [(0.0, 0.2 * i - 4, 0.0) if i % 2 else (40.0 + 2 * i, 0.0, 0.0) for i in range(count)]
+    points = np.concatenate([small.points + middle for middle in middles])
+    starts = np.arange(count).repeat(len(small.triangles))[:, None] * len(small.points)
+    bone = Surface(points, np.tile(small.triangles, (count, 1)) + starts)
+    found = depths(BODY, bone, Sphere((100.0, 0, 0), 1.0), STILL)
+    inner = [
+        found.values[np.isin(found.at - len(BODY.points) - len(BODY.triangles), part)].max(initial=0)
+        for part in np.arange(len(points)).reshape(count, -1)
+    ]
+    assert [deep > 2 for deep in inner] == [bool(i % 2) for i in range(count)]
 
 
 def deepest(body: Surface, radius: float, at) -> float:

@@ -1,9 +1,12 @@
 """Sums of radial basis functions: interpolation, polynomials, centres."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry import radial_basis as rb
 
 POINTS = np.random.default_rng(5).uniform(size=(60, 2))
@@ -57,6 +60,23 @@ def test_grid_has_the_corners_and_at_most_the_count() -> None:
     found = rb.grid_centres(POINTS, 10)
     assert len(found) == 9
     np.testing.assert_allclose(found[[0, -1]], [POINTS.min(axis=0), POINTS.max(axis=0)])
+
+
+@pytest.mark.parametrize("choose", [rb.greedy_centres, rb.feature_centres])
+def test_turned_scaled_and_renumbered_points_have_the_same_sum(choose: Callable[..., Floats]) -> None:
+    """With centres chosen among the points; those of a grid and Halton's are in a box along the axes. A shape is over a length."""
+    rng, shape = np.random.default_rng(2), 3.0
+    turn, order = np.linalg.qr(rng.normal(size=(2, 2))).Q, rng.permutation(len(POINTS))
+    there, values = (2.5 * POINTS @ turn.T + [30, -5])[order], VALUES[order]
+    kept = {"shape": shape, "terms": 3} if choose is rb.greedy_centres else {}
+    own = choose(POINTS, VALUES, 12, **kept)
+    other = choose(there, values, 12, **(kept and kept | {"shape": shape / 2.5}))
+    np.testing.assert_allclose(other, 2.5 * own @ turn.T + [30, -5], atol=1e-9)
+    asked = rng.uniform(size=(9, 2))
+    here = rb.radial_sum(POINTS, VALUES, own, shape, terms=3)(asked)
+    found = rb.radial_sum(there, values, other, shape / 2.5, terms=3)(2.5 * asked @ turn.T + [30, -5])
+    np.testing.assert_allclose(found, here, atol=1e-7)
+    assert np.ptp(here) > 0.5
 
 
 @pytest.mark.parametrize("count", [0, 3, 61])

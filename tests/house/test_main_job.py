@@ -73,7 +73,7 @@ def test_json_has_the_documented_keys(job) -> None:
     )
     metrics = {row["metric"] for row in rows(job.facts, "pbd")}
     surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
-    assert metrics == surface | {"fibre_length", "moment_arm", "penetration"}
+    assert metrics == surface | {"fibre_ends", "fibre_length", "moment_arm", "penetration"}
     assert {row["frame"] for row in rows(job.facts, "pbd")} == {0, 5, 10, 15, 20}
     assert {row["unit"] for row in rows(job.facts, "pbd")} == {"mm", "mm3", "%", "deg"}
 

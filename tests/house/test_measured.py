@@ -28,6 +28,9 @@ def test_a_measurement_says_its_command_commit_date_and_machine(name) -> None:
 
 def test_what_is_kept_of_the_catalogue_passes() -> None:
     for entry in measurements.kept("verify")["measured"]:
+        if entry["kind"] == "experiment":
+            assert entry["verdict"] in ("within", "outside")
+            continue
         assert entry["verdict"] == "pass"
         assert entry["error"] <= entry["within"], entry["name"]
 

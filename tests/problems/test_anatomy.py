@@ -1,5 +1,6 @@
 """Attachments and fibres of a case: what a file lists, what lies near, patches of landmarks, and where lines and directions are."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,19 @@ import random_scenes
 import shapes
 from auto_scenes import STILL, pennate
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Polylines, Surface, TetMesh, check_closed, triangle_areas, vertex_areas
+from fem_reference.foundations.mesh import (
+    Polylines,
+    Surface,
+    TetMesh,
+    check_closed,
+    corner_areas,
+    triangle_areas,
+    vertex_areas,
+)
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import edge_lengths
@@ -20,6 +30,7 @@ from fem_reference.io import files
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.anatomy import draped, facets_under, fan, pick
 from fem_reference.problems.estimates import estimates
+from fem_reference.problems.fibre_ends import REACHES, attached_ends, ends_of
 from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, MuscleCase
@@ -247,16 +258,20 @@ def test_given_fibres_stay_inside_the_muscle(bar) -> None:
 
 
 @pytest.mark.slow
-def test_given_fibres_are_read(bar) -> None:
-    lines = Polylines(np.array([[5.0, 5, 2], [5, 5, 20], [5, 5, 38]]), np.array([0, 3]))
+def test_given_fibres_are_read_and_completed(bar) -> None:
+    """The line begins 8 mm above the bottom and ends less than 2 mm below the top, which is close enough."""
+    lines = Polylines(np.array([[5.0, 5, 8], [5, 5, 20], [5, 5, 38.1]]), np.array([0, 3]))
     files.write_polylines(bar / "lines.vtp", lines, lines.points)
     text = (bar / "case.toml").read_text()
     traced = 'traced = { count = 4, start = "origin", end = "insertion" }'
     assert traced in text
     (bar / "case.toml").write_text(text.replace(traced, 'polylines = { file = "lines.vtp", unit = "mm" }'))
     try:
-        case = casefile.read(bar)
-        assert muscle.build(case, muscle.setup(case)).fibres.lengths().tolist() == [36]
+        for complete, length, beside in ((False, 30.1, 1), (True, 38.1, 0)):
+            case = casefile.read_muscle(bar, {"fibres.complete": complete})
+            built = muscle.build(case, muscle.setup(case))
+            assert built.fibres.lengths() == pytest.approx([length], rel=1e-6)
+            assert built.mesh_facts["fibre_ends_beyond_2_mm"] == beside
     finally:
         (bar / "case.toml").write_text(text)
 
@@ -280,6 +295,91 @@ def test_lines_that_are_given_are_the_directions(tmp_path) -> None:
     assert np.abs(along @ [np.sin(lean), 0, np.cos(lean)]) == pytest.approx(1, abs=1e-6)
     assert lines.points.min(axis=0).min() >= -1e-9
     assert (lines.points.max(axis=0) <= np.array([10, 10, 40]) + 1e-9).all()
+
+
+def check_coverage(case: MuscleCase) -> None:
+    """Every end within 2 mm of its attachment, and 90 % of each attachment within the mean spacing, sqrt(A / n), of an end."""
+    rest = muscle.setup(case)
+    lines, _ = anatomy.fibres_of(case, rest.surface, partial(muscle.filled, case, rest))
+    ends = attached_ends(rest.attached, rest.exempt, lines)
+    assert ends is not None
+    assert ends.distance.max() < REACHES
+    points = ends_of(lines)
+    for number in range(2):
+        corners = rest.exempt.part[rest.exempt.by == number]
+        areas = corner_areas(corners)
+        away, _ = cKDTree(points[ends.by == number]).query(corners.mean(axis=1))
+        spacing = np.sqrt(areas.sum() / len(lines.lengths()))
+        assert areas[away <= spacing].sum() > 0.9 * areas.sum()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("data")
+@pytest.mark.parametrize("name", ["iliacus_anatomical", "gluteus_medius_anatomical"])
+def test_fibres_by_area_reach_and_cover_the_dissected_attachments(name: str) -> None:
+    case = casefile.read_muscle(name)
+    assert case.fibres.traced is not None
+    assert case.fibres.traced.flux == "area"
+    check_coverage(case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flux", ["area", None])
+def test_fibres_of_a_spindle_cover_its_ends_either_way(flux: str | None) -> None:
+    case = casefile.read_muscle("hip_flexion")
+    assert case.fibres.traced is not None
+    traced = case.fibres.traced.model_copy(update={"flux": flux})
+    check_coverage(case.model_copy(update={"fibres": case.fibres.model_copy(update={"traced": traced})}))
+
+
+REACHING = (
+    "adductor_brevis",
+    "gluteus_maximus_anatomical",
+    "gluteus_medius",
+    "gluteus_medius_anatomical",
+    "hip_flexion",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("data")
+@pytest.mark.parametrize("name", [*REACHING, "gluteus_maximus", "iliacus", "iliacus_anatomical"])
+def test_every_fibre_of_every_shipped_muscle_reaches_its_attachment_or_is_named(name: str) -> None:
+    """All do but those of the report's gluteus maximus with the report's attachments, as given: seven ends."""
+    case = casefile.read_muscle(name, {"muscle.refinements": 0})
+    facts = muscle.build(case, muscle.setup(case)).mesh_facts
+    named = str(facts.get("fibre_ends_not_attached", "")).count("of fibre")
+    assert named == facts["fibre_ends_beyond_2_mm"] == (7 if name == "gluteus_maximus" else 0)
+    assert facts.get("fibre_ends_by_tendon", 0) == (5 if name == "gluteus_maximus_anatomical" else 0)
+
+
+def test_a_tendon_goes_to_the_middle_of_its_landmarks(tmp_path: Path) -> None:
+    (tmp_path / "landmarks.csv").write_text("cloud,landmark,x,y,z\nfoot,1,1,2,3\nhand,1,9,9,9\nfoot,2,3,4,8\n")
+    cloud = {"file": "landmarks.csv", "unit": "cm", "cloud": "foot"}
+    given = Attachment(name="end", bone="tibia", within="1 mm", tendon=cloud)
+    without = Attachment(name="end", bone="tibia", within="1 mm")
+    lost = Attachment(name="end", bone="tibia", within="1 mm", tendon=cloud | {"cloud": "head"})
+    case = MuscleCase.model_construct(folder=tmp_path, place="case.toml", attachment=(given, without, lost))
+    assert anatomy.tendon_of(case, 0) == pytest.approx([20, 30, 55])
+    assert anatomy.tendon_of(case, 1) is None
+    with pytest.raises(
+        InputError, match=r'case.toml: attachment\[2\].tendon.cloud: got "head".*want one of foot, hand'
+    ):
+        anatomy.tendon_of(case, 2)
+
+
+def test_fibres_by_area_of_a_case(bar) -> None:
+    """Asked for by their key: a line through each of a few mm2, and the directions of the flow."""
+    case = casefile.read_muscle(bar)
+    assert case.fibres.traced is not None
+    changes = {"start": "bottom", "end": "top", "flux": "area"}
+    traced = case.fibres.traced.model_copy(update=changes)
+    case = case.model_copy(update={"fibres": case.fibres.model_copy(update={"traced": traced})})
+    box = shapes.box((2, 2, 6), (10.0, 10.0, 40.0))
+    lines, direction = anatomy.fibres_of(case, shapes.skin(box), lambda _: box)
+    assert len(lines.lengths()) == traced.count
+    assert lines.lengths() == pytest.approx(40, rel=1e-9)
+    assert direction(np.zeros(1, int), np.array([[3.0, 4, 11]])) == pytest.approx(np.array([[0.0, 0, 1]]), abs=1e-9)
 
 
 def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:

@@ -51,16 +51,19 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
 def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is solved" in html(comparison)
     text = html(with_bars(comparison))
+    # The band of the model stands beside the numerical bars, and only there.
+    assert "differ from images of the same muscles by 1.70 to 5.20" in text
+    assert "images of the same muscles" not in html(comparison)
     assert "(4 mm instead of 2 mm)" in text
     assert "order 1.50 in general" in text
     names = ", ".join(attachment.name for attachment in comparison.scene.attachment)
     assert f"Along the rims of {names}, where" in text
-    assert "The last column is the change of a statistic by exact attachments" in text
+    assert "The last column is the change of a statistic by another model of them: by exact attachments" in text
     assert "cause of error halved at a time (load steps)" in text
     assert "--error-bar" not in text
     # The worst frame of "quick" is the last, where the bar is not known; that of "torn" is the one before.
     assert '<small>± <span class="bad">not a number</span>' in text
-    assert text.count("<th>exact attachments</th>") == 2
+    assert text.count("<th>another model</th>") == 2
     rows = report.summary(with_bars(comparison))["error_bars"]
     found = [row for row in rows if (row["of"], row["metric"], row["statistic"]) == ("change", "volume", "deviation")]
     assert [row["value"] for row in found] == [

@@ -44,6 +44,20 @@ def test_page_shows_everything_and_needs_no_network() -> None:
     assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http(?!-equiv)", bare)
 
 
+def test_experiments_stand_apart_and_outside_is_no_failure() -> None:
+    one = made("cube", 2.5, kind="experiment", pinned=2.5, group="experiments")
+    alone, both = verification(one), verification(made(), one)
+    assert alone.word == both.word == "pass"
+    for found, drawings in ((alone, 0), (both, 1)):
+        text = verify_page.page(found).html()
+        assert '<span class="badge outside">outside</span>' in text
+        assert "0 of 1 experiments met within their uncertainty: outside is a finding" in text
+        assert text.count("<svg ") == drawings
+        assert "0 of 1 within</small>" in text
+        assert "<b>Uncertainty:</b>" in text
+    assert "experiments met" not in verify_page.page(verification(made())).html()
+
+
 def test_every_id_is_unique_and_every_reference_meets_one() -> None:
     results = [
         made(name, value, order=2.0, ladder=LADDER) for name, value in (("bar", 2.0), ("tip", 3.0), ("rod", NAN))

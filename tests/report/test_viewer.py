@@ -127,9 +127,7 @@ def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison, 
     changed = replace(comparison, setup=replace(comparison.setup, surface=ball), reference=given[0])
     monkeypatch.setattr(viewer_fields.local_fields, "to_surface", lambda run, _: run.positions[:, :, 0])
     monkeypatch.setattr(viewer_fields.local_fields, "to_bones", lambda run, _: run.positions[:, :, 1])
-    monkeypatch.setattr(
-        viewer_fields.local_fields, "fibre_points", lambda run, _: np.zeros((len(run.numbers), 1000, 3))
-    )
+    monkeypatch.setattr(viewer_fields, "fibre_points", lambda run, _: np.zeros((len(run.numbers), 1000, 3)))
     seen = viewer.view(replace(changed, candidates=tuple(given[1:])))
     packed = 4 * 31 * 10242 * (3 * 2 + 2)
     assert seen["every"] == 1

@@ -60,6 +60,18 @@ def test_small_states_are_kept_by_default_and_large_ones_are_not(
     assert json.loads((again.folder / "error_bar.json").read_text()) == {"kept": True}
 
 
+def test_states_are_kept_only_where_those_of_all_frames_are(tmp_path: Path) -> None:
+    mesh = shapes.box((1, 1, 1), (10, 10, 10))
+    state = NodalState(np.zeros((6, 4, 3)), np.zeros((6, 1)), np.zeros((0, 0, 3)))
+    states.write(tmp_path, 0, state)
+    assert not states.are_kept(tmp_path, (0,))  # of which mesh nobody knows
+    states.write_rest(tmp_path, mesh, None)
+    assert states.are_kept(tmp_path, (0,))
+    assert not states.are_kept(tmp_path, (0, 5))
+    states.write(tmp_path, 5, state)
+    assert states.are_kept(tmp_path, (0, 5))
+
+
 KEYFRAMES = [{"frame": 0, "angle": "0 rad"}, {"frame": 5, "angle": "0.1 rad"}]
 
 

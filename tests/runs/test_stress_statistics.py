@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.foundations.mesh import TetMesh
+from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.runs import stress_statistics
 from fem_reference.runs.results import Results
 from fem_reference.runs.states import NodalState
@@ -49,6 +49,29 @@ def test_statistics_are_over_the_volume_and_not_over_the_cells(most: int, monkey
     assert found["stress_pressure_p05"] == pytest.approx(-0.95 * greatest, abs=0.02 * greatest)
     assert found["stress_pressure_p95"] == pytest.approx(-0.05 * greatest, abs=0.02 * greatest)
     assert found["stress_von_mises_p95"] == pytest.approx(0, abs=1e-12)
+
+
+def test_a_body_turned_moved_scaled_and_renumbered_has_the_same_stresses() -> None:
+    """Of a state that varies: turned at rest with all its fibres, then once more as it is; stresses have no length."""
+    rng = np.random.default_rng(5)
+    rest, later = (np.linalg.qr(rng.normal(size=(3, 3))).Q for _ in range(2))
+    rest, later = rest * np.linalg.det(rest), later * np.linalg.det(later)
+    where, there = nodes(MESH, 2), nodes(MESH, 1)
+
+    def bent(X: Floats) -> Floats:
+        return X + 0.02 * X[..., [1, 2, 0]] ** 2
+
+    pressure = 0.1 * there[..., 0] * there[..., 2]
+    own = NodalState(bent(where) - where, pressure, np.zeros((0, 0, 3)))
+    found = stress_scalars(Results(MESH, MATRIX, {0.0: own}, FIBRES), 0.0)
+    order, cells = rng.permutation(len(MESH.points)), rng.permutation(len(MESH.tets))
+    mesh = TetMesh(2.5 * MESH.points[order] @ rest.T + [3, -4, 5], np.argsort(order)[MESH.tets[cells]])
+    new = 2.5 * where[cells] @ rest.T + [3, -4, 5]
+    displacement = 2.5 * bent(where[cells]) @ rest.T @ later.T + [9, 8, 7] - new
+    other = NodalState(displacement, pressure[cells], np.zeros((0, 0, 3)))
+    again = stress_scalars(Results(mesh, MATRIX, {0.0: other}, FIBRES[cells] @ rest.T), 0.0)
+    assert again == pytest.approx(found, rel=1e-9)
+    assert found["stress_along_fibres_p95"] > 1.1 * found["stress_along_fibres_mean"] > 0
 
 
 def test_what_is_inside_out_has_no_statistics() -> None:

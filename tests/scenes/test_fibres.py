@@ -32,6 +32,15 @@ def test_templates_that_cannot_be_are_refused(bar: Path, source: dict, message: 
     refused(bar, "fibres", {"kohout_kukacka": source}, message)
 
 
+def test_the_flux_of_traced_fibres_is_by_area_or_not_given(bar: Path) -> None:
+    traced = {"count": 4, "start": "start", "end": "end"}
+    for flux in ({}, {"flux": "area"}):
+        given = changed(bar, "fibres", {"traced": traced | flux}).fibres.traced
+        assert given is not None
+        assert given.flux == flux.get("flux")
+    refused(bar, "fibres", {"traced": traced | {"flux": "volume"}}, "fibres.traced.flux: got")
+
+
 def test_there_is_one_source(bar: Path) -> None:
     refused(
         bar,

@@ -299,7 +299,7 @@ def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
     metrics = {
         name: {row["metric"] for row in printed["measures"] if row["candidate"] == name} for name in printed["cost"]
     }
-    assert metrics["line"] == metrics["around"] == {"fibre_length", "moment_arm"}
+    assert metrics["line"] == metrics["around"] == {"fibre_ends", "fibre_length", "moment_arm"}
     assert {"fibre_length", "surface_deviation", "volume", "penetration"} <= metrics["springs"]
     judged = {(row["of"], row["metric"]): row["verdict"] for row in printed["verdicts"]}
     assert judged == {
@@ -323,7 +323,11 @@ def test_a_line_is_shorter_than_its_fibre_at_rest_already(compared) -> None:
     assert -1 < rows["line", "mean"] < -0.01  # fibres of a bulging bar are bent
     assert rows["around", "mean"] > rows["line", "mean"]
     written = list(csv.DictReader((out / "bar" / "measures.csv").read_text().splitlines()))
-    assert {row["metric"] for row in written if row["candidate"] == "line"} == {"fibre_length", "moment_arm"}
+    assert {row["metric"] for row in written if row["candidate"] == "line"} == {
+        "fibre_ends",
+        "fibre_length",
+        "moment_arm",
+    }
     assert all(row["value"] for row in written)
 
 
@@ -560,14 +564,21 @@ def grown(settings: dict, turn: np.ndarray, shift: np.ndarray, factor: float) ->
             return ", ".join(repr(float(angle)) for angle in vector) + " deg"
         if isinstance(value, str) and value.endswith(" mm"):
             numbers = factor * np.array([float(number) for number in value.removesuffix(" mm").split(",")])
-            placed = turn @ numbers + shift if key in {"centre", "start", "end"} else numbers
+            placed = turn @ numbers + shift if key in {"centre", "start", "end", "position"} else numbers
             return ", ".join(repr(float(number)) for number in placed) + " mm"
         return value
 
     return {key: one(key, value) for key, value in settings.items()}
 
 
-@pytest.mark.parametrize("obstacle", OBSTACLES)
+PLACES = [
+    {"angle": f"{angle} rad", "position": f"{place} mm"}
+    for angle, place in ((0, "5, 8, 9"), (6, "4, 12, 11"), (9, "5, 9, 14"))
+]
+MOVING = {"via": [{"at": 0.4, "bone": "top", "joint": "counter", "curve": PLACES}]}
+
+
+@pytest.mark.parametrize("obstacle", [*OBSTACLES, MOVING])
 def test_a_scene_turned_moved_scaled_and_renumbered_has_the_same_arms_forces_and_moments(obstacle) -> None:
     """Lengths and arms to scale, forces as its square (so is F0), moments as its cube; turned as the scene is."""
     given, factor, shift = bar(PULLED), 2.5, np.array([30.0, -50, 7])

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import shapes
 import small
+from scipy.spatial.transform import Rotation as Turn
 
-from fem_reference.foundations.mesh import Polylines
+from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes import casefile
 from fem_reference.studies import estimation
@@ -51,6 +52,32 @@ def test_a_flat_attachment_has_no_error_and_a_ball_is_fitted() -> None:
     assert [one.gaussians for one in fits] == [10, 30, 100]
     assert max(one.rms for one in fits) < 0.5
     assert fits[0].fewer == 3 * 642 / 40
+
+
+ROUNDED = ("Gaussian RBF", 20)
+
+
+def test_a_muscle_turned_moved_scaled_and_renumbered_has_the_same_errors() -> None:
+    """Errors of curves and attached areas to scale; condition numbers have no length. Surfaces: test_gaussian_surface."""
+    ball, rng = shapes.sphere(3, 20.0), np.random.default_rng(0)
+    surface = ball.moved_to(ball.points * [1, 1.3, 1.6] + rng.normal(scale=0.3, size=ball.points.shape))
+    turn, order = Turn.random(rng=rng), rng.permutation(len(surface.points))
+    back = np.argsort(order)
+    other = Surface(2.5 * turn.apply(surface.points[order]) + [30, -50, 7], back[surface.triangles])
+    cap = np.flatnonzero(surface.points[:, 2] > 20)
+    arc = 40 * np.column_stack([np.cos(t := np.linspace(0, 1.5, 31)), np.sin(t), 0.1 * t])
+    found = []
+    for one, vertices, line in ((surface, cap, arc), (other, np.sort(back[cap]), 2.5 * turn.apply(arc) + [30, -50, 7])):
+        bone = Bone("bone", one, None)
+        rest = Setup(one, (bone,), (AttachedVertices("origin", bone, vertices),), (0, 1), None)
+        heights = list(estimation.of_attachments("case", rest))
+        # Gaussians through 20 points are so wide that their matrix is singular but for rounding: 0.01 mm of 0.04.
+        errors = [one for one in estimation.of_fibres("case", fibres(line)) if (one.technique, one.known) != ROUNDED]
+        curved = [error.rms for error in errors]
+        found.append(([error.condition for error in heights], [error.rms for error in heights], curved))
+    for own, great, factor in zip(*found, (1, 2.5, 2.5), strict=True):
+        assert len(own) > 2
+        assert great == pytest.approx([factor * value for value in own], rel=1e-3)
 
 
 BOX = shapes.skin(shapes.box((2, 2, 4), (20.0, 20.0, 60.0)))

@@ -179,6 +179,18 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
     assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
 
 
+@pytest.mark.parametrize("changes", [{}, {"attachment[0].stiffness": "100 kPa/mm"}])
+def test_bars_know_whether_an_attachment_is_by_springs(case, monkeypatch, changes) -> None:
+    pairs, make = [], error_bars.error_bars
+    monkeypatch.setattr(error_bars, "error_bars", lambda pair, context: pairs.append(pair) or make(pair, context))
+    bench = Bench(casefile.read_muscle(case, changes=changes), case.parent / "runs")
+    reference = bench.obtain("reference", bench.scene.reference, "reference")
+    for model in (True, False):
+        refinement.obtain(bench, reference, model=model)
+    assert [pair.springs for pair in pairs] == [bool(changes)] * 2
+    assert [pair.exact is not None for pair in pairs] == [bool(changes), False]
+
+
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
     monkeypatch.setattr(refinement, "RATIO", 1.0)
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")

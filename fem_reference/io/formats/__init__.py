@@ -19,7 +19,7 @@ from fem_reference.io.soup import Soup
 class Format:
     """A mesh format, known by the ``suffixes`` of its files, lower case, with their dots.
 
-        ``read``: points and triangles as in the file; raises any exception where the file is not whole. ``write``: the surface
+    ``read``: points and triangles as in the file; raises any exception where the file is not whole. ``write``: the surface
     as it is, with its displacement (n, 3) [mm] where the format has room for it; None where the format is only read.
     ``shares_points``: whether triangles have points in common, in their order; else each has three of its own.
     ``states_size``: whether a file says how much of it there is; else a cut between two of its lines is not seen.

@@ -10,13 +10,7 @@ from fem_reference.io.soup import DataSet, check_number, checked_cells, whole_nu
 
 _HEAD = re.compile(rb"# vtk DataFile Version (\d+)\.(\d+)[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)\s*?\n")
 _KINDS = {b"POLYDATA": "PolyData", b"UNSTRUCTURED_GRID": "UnstructuredGrid"}
-_CELLS = {
-    "LINES": "Lines",
-    "POLYGONS": "Polys",
-    "TRIANGLE_STRIPS": "Strips",
-    "CELLS": "Cells",
-    "VERTICES": "Verts",
-}
+_CELLS = {"LINES": "Lines", "POLYGONS": "Polys", "TRIANGLE_STRIPS": "Strips", "CELLS": "Cells", "VERTICES": "Verts"}
 _TYPES = {
     "char": "i1", "signed_char": "i1", "short": "i2", "int": "i4", "long": "i8", "vtktypeint32": "i4", "vtktypeint64": "i8",
     "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",

@@ -146,10 +146,8 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
 
 # Bytes from a block that should have so many: never more than one byte more.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
-    "vtkZLibDataCompressor": lambda packed, wanted: zlib.decompressobj().decompress(packed, wanted + 1),
-    "vtkLZMADataCompressor": lambda packed, wanted: lzma.LZMADecompressor(memlimit=_MOST).decompress(
-        packed, wanted + 1
-    ),
+    "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most + 1),
+    "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most + 1),
     "vtkLZ4DataCompressor": _of_lz4,
 }
 

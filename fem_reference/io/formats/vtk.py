@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.soup import DataSet, Lines, Soup, joined, only_triangles
 
@@ -37,7 +37,7 @@ type Tree = Mapping[str, "DataBlock | Tree"]
 
 def _read(path: Path) -> Soup:
     """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata passed over)."""
-    data = _data(path)
+    data = data_set(path)
     if data.kind == "UnstructuredGrid" and (other := set(data.types.tolist()) - {_TRIANGLE}):
         raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
     if "Strips" in data.cells and len(data.cells["Strips"].corners):
@@ -51,7 +51,7 @@ def _read(path: Path) -> Soup:
 
 def read_lines(path: Path) -> Lines:
     """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
-    data = _data(path)
+    data = data_set(path)
     found = data.cells.get("Lines")
     if data.kind != "PolyData" or found is None or len(found.corners) == 0:
         raise ValueError("no lines")
@@ -62,24 +62,16 @@ def read_lines(path: Path) -> Lines:
     return np.asarray(data.points, np.float64), joined(cells)
 
 
-def read_points(path: Path) -> Any:
-    """The points (n, 3) of a file."""
-    return _data(path).points
-
-
-def _data(path: Path) -> DataSet:
-    """The data set of a VTK file."""
+def data_set(path: Path) -> DataSet:
+    """The points and cells of a VTK file."""
     read = _vtk_legacy.read if path.suffix.lower() == ".vtk" else _vtk_xml.read
     return read(path.read_bytes())
 
 
-def _write(path: Path, surface: Surface, displacement: Floats) -> None:
-    """The surface with point data ``displacement`` [mm], float64; as an unstructured grid in VTU."""
-    save(path, surface.points, surface.triangles, displacement)
-
-
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells`` with point data ``displacement`` (n, 3) [mm], float64; OSError where that fails."""
+    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm], float64; OSError where that
+    fails.
+    """
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
@@ -134,4 +126,6 @@ def _data_set(block: DataBlock) -> Any:
     return data
 
 
-FORMAT = Format((".vtk", ".vtp", ".vtu"), _read, _write)
+FORMAT = Format(
+    (".vtk", ".vtp", ".vtu"), _read, lambda path, surface, moves: save(path, surface.points, surface.triangles, moves)
+)

@@ -24,15 +24,12 @@ _PARTS = 16
 
 
 class FrameModel(Protocol):
-    """A model of a muscle that advances from frame number to frame number."""
+    """A model of a muscle that advances from frame number to frame number; the loop adds to its ``cost``, and gives its ``advice``
+    for a run that ends in trouble.
+    """
 
-    @property
-    def cost(self) -> dict[str, float]:
-        """The cost so far, to which the loop adds."""
-
-    @property
-    def advice(self) -> str:
-        """Advice for a run that ends in trouble."""
+    cost: dict[str, float]
+    advice: str
 
     def move(self, number: int, /) -> None:
         """Advance to the frame ``number``; the time of this counts as solving."""

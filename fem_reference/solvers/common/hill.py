@@ -62,10 +62,9 @@ class Hill(Record):
         along = self.optimal_length * fibre * self.cosine(fibre)
         return tendon((path - along) / self.slack_length - 1)
 
-    def imbalance(self, path: float, fibre: float, activation: float, velocity: float = 0.0) -> float:
-        """The force [F0] of the fibres along the tendon less that of the tendon; ``velocity`` of shortening [l0 / s]."""
-        contractile = activation * active(fibre) * hyperbola(velocity / self.max_velocity, self.curvature)
-        return (contractile + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
+    def imbalance(self, path: float, fibre: float, activation: float) -> float:
+        """The force [F0] of fibres at rest along the tendon less that of the tendon."""
+        return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
         """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
@@ -80,9 +79,8 @@ class Hill(Record):
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
-            raise InputError(
-                "hill", f"a path of {path:.4g} mm", "one on which fibres keep a tenth of their optimal length"
-            )
+            want = "one on which fibres keep a tenth of their optimal length"
+            raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
         fibre = float(brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
         return self.max_force * self.tendon_force(path, fibre), fibre
@@ -114,10 +112,8 @@ class Hill(Record):
         for start, end in pairwise(times):  # each with its own slopes
             found = solve_ivp(rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance)
             lengths.append(float(found.y[0, -1]))
-        forces = [
-            self.max_force * self.tendon_force(float(path), one) for path, one in zip(paths, lengths, strict=True)
-        ]
-        return np.array(forces), np.array(lengths)
+        shares = [self.tendon_force(float(path), one) for path, one in zip(paths, lengths, strict=True)]
+        return self.max_force * np.array(shares), np.array(lengths)
 
 
 class HillSettings(Record):

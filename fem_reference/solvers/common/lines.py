@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
@@ -32,8 +32,9 @@ class Via(Record):
     """A point of every fibre that moves with a ``bone``: where it is at rest ``at`` this share of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass the point; at others they leave it out.
-    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them monotone cubics (PCHIP),
-    beyond them the nearest. ``at`` is then its place among the points alone.
+    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them cubics whose slopes are those
+    of parabolas through neighbours, as Catmull and Rom have them, whatever the axes of the scene; beyond them the nearest. ``at``
+    is then its place among the points alone.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]
@@ -69,8 +70,9 @@ class Guided:
     def position(self, number: int) -> Floats:
         """The point (3,) [mm] on its bone, in the frame of rest; that of a ``curve``."""
         angles = [point.angle for point in self.via.curve]
+        places = np.array([point.position for point in self.via.curve])
         angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])
-        return np.asarray(PchipInterpolator(angles, [point.position for point in self.via.curve])(angle))
+        return np.asarray(CubicHermiteSpline(angles, places, np.gradient(places, angles, axis=0))(angle))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +174,6 @@ def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) ->
     """The index of the item with this ``name``; InputError at ``place`` where there is none."""
     names = [one.name for one in named]
     if name not in names:
-        raise InputError(
-            place, f'"{name}"', f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
-        )
+        want = f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
+        raise InputError(place, f'"{name}"', want)
     return names.index(name)

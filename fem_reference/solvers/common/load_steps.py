@@ -84,8 +84,9 @@ def march(
             if goal == frame and recall(frame):
                 at = goal
             while at < goal:
-                size = _size(goal - at, step, largest)
-                then = goal if size == goal - at else at + size
+                left = goal - at  # in steps of equal size near to ``step``: none is a sliver
+                size = left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
+                then = goal if size == left else at + size
                 result = attempt(then)
                 iterations += result.iterations
                 if not result.converged:
@@ -101,8 +102,3 @@ def march(
                 taken += 1
                 step = step * GROWTH if result.iterations <= EASY else size
         yield Step(frame, taken, iterations, cutbacks, result, at, step)
-
-
-def _size(left: float, step: float, largest: float) -> float:
-    """The size of equal load steps over ``left``, near to ``step``: none is a sliver."""
-    return left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))

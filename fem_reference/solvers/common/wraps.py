@@ -71,9 +71,8 @@ class ObstacleOn(Record):
         if (ball := self.sphere) is not None:
             return Quadric(_pose(Rotation.identity(), ball.centre), np.full(3, ball.radius))
         if (roll := self.cylinder) is not None:
-            return Quadric(
-                _pose(_onto(np.subtract(roll.end, roll.start)), roll.start), np.array([roll.radius] * 2 + [np.inf])
-            )
+            radii = np.array([roll.radius, roll.radius, np.inf])
+            return Quadric(_pose(_onto(np.subtract(roll.end, roll.start)), roll.start), radii)
         if (egg := self.ellipsoid) is not None:
             return Quadric(_pose(Rotation.from_rotvec(egg.turn), egg.centre), np.array(egg.radii))
         ring = self.torus

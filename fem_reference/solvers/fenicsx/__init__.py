@@ -86,10 +86,8 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
     with opened(chosen.ranks or 1) as solver:
         outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
-        begin = (
-            "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given): "
-        )
-        outcome = replace(outcome, message=begin + outcome.message)
+        begin = "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given)"
+        outcome = replace(outcome, message=f"{begin}: {outcome.message}")
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
@@ -134,16 +132,10 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    return replace(
-        frame, note=note, scalars=scalars | pulls | _attachment_errors(problem, frame) | _stresses(problem, frame)
-    )
-
-
-def _stresses(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
-    """The statistics of the stress [MPa]."""
     assert frame.state is not None  # of a muscle
-    states = {frame.number: frame.state}
-    return stress_scalars(Results(problem.mesh, problem.effects, states, problem.directions), frame.number)
+    results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions)
+    own = pulls | _attachment_errors(problem, frame) | stress_scalars(results, frame.number)
+    return replace(frame, note=note, scalars=scalars | own)
 
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:

@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.effects import Effect, Energy, Ramped
+from fem_reference.effects import Energy, Load, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
@@ -32,7 +32,7 @@ from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.solvers.fenicsx.stability import Stability, has_energy
+from fem_reference.solvers.fenicsx.stability import Stability
 from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
 
@@ -43,12 +43,12 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
-        self.conserves = not any(map(_is_changed_from_outside, self.effects))
+        changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
+        self.conserves = not any(changed)  # True where no energy changes without deformation of the body
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[
-            : self.mesh.topology.index_map(3).size_local
-        ]
+        count = self.mesh.topology.index_map(3).size_local
+        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
         self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
@@ -62,11 +62,12 @@ class AssembledBody:
         self.determinants = Determinants(self.displacement, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
-        self.system = System(form, self.unknowns, settings.element, self.conditions, self.spent)
-        self.linear = _linear_solver(self.system, has_energy(body), settings, self.spent)
-        self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
+        self.system = System(form, self.conditions, self.spent)
+        symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
+        self.linear = _linear_solver(self.system, symmetric, settings)
+        self.newton = Newton(self.system, self.linear, self.determinants, settings)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
-        self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
+        self.stability = Stability(self.system, cast(Factorised, self.linear)) if counts else None
         self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
         self.system.balance_units()
         self.path = Path(self.system, self.determinants)
@@ -79,13 +80,11 @@ class AssembledBody:
         self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock)
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
-        """The condition of ``entry`` on this rank's unknowns."""
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
         return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
 
     def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
-        """The contact of bones with this rank's points."""
         if isinstance(law.on, str):
             points = contact_points.on_facets(self.displacement, body.mesh, form.regions[law.on], form.degree)
         else:
@@ -284,16 +283,11 @@ class AssembledBody:
         return result
 
 
-def _is_changed_from_outside(effect: Effect) -> bool:
-    """True for an energy that changes without deformation of the body."""
-    return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
-
-
-def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spent: Spent) -> LinearSolver:
+def _linear_solver(system: System, symmetric: bool, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
     system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # the type that the stubs declare
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
-        return Multigrid(system, spent)
+        return Multigrid(system)
     precision = settings.precision or ("double" if kind == "direct" else "single")
-    return Factorised(system.matrix, symmetric, kind == "lagged", precision, spent)
+    return Factorised(system.matrix, symmetric, kind == "lagged", precision, system.spent)

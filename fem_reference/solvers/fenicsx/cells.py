@@ -1,12 +1,12 @@
 """Residual and tangent of the energy, summed over cells by compiled loops (``cells.c``), in chunks that fit into a cache."""
 
 import ctypes
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from dolfinx import fem
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 
@@ -48,27 +48,23 @@ class CellSums:
     the pressures; ``structure``: that of the tangent.
     """
 
-    def __init__(self, form: Form, unknowns: fem.Function, element: str) -> None:
+    def __init__(self, form: Form) -> None:
+        unknowns, element = form.unknowns, form.element
         space, msh = unknowns.function_space, unknowns.function_space.mesh
         self.form, self.mesh, self.function = form, msh, unknowns
         self.count = msh.topology.index_map(3).size_local
         self.size = len(unknowns.x.array)
-        self.unknowns = _unknowns(space)[: self.count]
+        parts = [space.sub(0).sub(component) for component in range(3)]
+        parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
+        self.unknowns: Places = np.concatenate([part.dofmap.list for part in parts], axis=1)[: self.count]
         self.nodes = space.sub(0).sub(0).dofmap.list.shape[1]
         tables = _tables(element, msh, form.rule)
         self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # C only holds their addresses
         self.element = _Element(*(table.ctypes.data for table in self.kept))
         self.corners = np.ascontiguousarray(msh.geometry.x[msh.geometry.dofmap[: self.count]])
-        self.code = compiling.library(
-            Path(__file__).with_name("cells.c"),
-            {
-                "POINTS": len(form.rule[1]),
-                "NODES": self.nodes,
-                "PRESSURES": self.unknowns.shape[1] - 3 * self.nodes,
-                "GEOMETRY": self.corners.shape[1],
-                "KINDS": form.kinds,
-            },
-        )
+        sizes = {"POINTS": len(form.rule[1]), "NODES": self.nodes, "PRESSURES": self.unknowns.shape[1] - 3 * self.nodes}
+        sizes |= {"GEOMETRY": self.corners.shape[1], "KINDS": form.kinds}
+        self.code = compiling.library(Path(__file__).with_name("cells.c"), sizes)
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
@@ -85,12 +81,9 @@ class CellSums:
         place after the last.
         """
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
-        self.code.find_places(
-            ctypes.c_long(self.count),
-            *(_address(array) for array in (self.unknowns, structure.starts, structure.columns, fixed.view(np.int8))),
-            ctypes.c_int(len(structure.columns)),
-            _address(found),
-        )
+        arrays: tuple[NDArray[Any], ...] = self.unknowns, structure.starts, structure.columns, fixed.view(np.int8)
+        size = ctypes.c_int(len(structure.columns))
+        self.code.find_places(ctypes.c_long(self.count), *map(_address, arrays), size, _address(found))
         return found
 
     def add(
@@ -128,10 +121,9 @@ class CellSums:
         """Add the tangent of tractions at points of ``cells`` (n,) with the values ``basis`` (n, k) of their functions; ``slope``
         (n, 3, 3) is the derivative of the tractions by the positions of the points.
         """
-        arrays = (cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope))
-        self.code.add_points(
-            ctypes.c_long(len(cells)), *(_address(array) for array in (*arrays, into.places, into.entries))
-        )
+        given = cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope)
+        arrays: tuple[NDArray[Any], ...] = *given, into.places, into.entries
+        self.code.add_points(ctypes.c_long(len(cells)), *map(_address, arrays))
 
     def softness(self) -> Floats:
         """The mass matrix (m, p, p) by cell of the pressures [mm3/MPa] over the stiffness against them: twice the shear
@@ -140,10 +132,9 @@ class CellSums:
         rows, basis = self._diagonal(), self._pressures()
         stiff = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3)]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
-        for some in self._chunks():
-            given = self._second(some)
+        for some, given, volumes in self._parts():
             soft = 0.5 / np.abs(given[..., stiff].mean(axis=-1)) - given[..., rows[-1]]
-            found[some] = np.einsum("mq,qc,qd->mcd", soft * self._volumes(some), basis, basis)
+            found[some] = np.einsum("mq,qc,qd->mcd", soft * volumes, basis, basis)
         return found
 
     def stabilising_energy(self) -> float:
@@ -158,9 +149,8 @@ class CellSums:
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
-        for some in self._chunks():
-            volumes, modulus = self._volumes(some), np.abs(self._second(some)[..., shear].mean(axis=(1, 2)))
-            mean = volumes @ basis
+        for some, given, volumes in self._parts():
+            modulus, mean = np.abs(given[..., shear].mean(axis=(1, 2))), volumes @ basis
             within = mean[:, :, None] * mean[:, None] / volumes.sum(axis=1)[:, None, None]
             mass = np.einsum("mq,qc,qd->mcd", volumes, basis, basis)
             soft = np.divide(0.5, modulus, out=np.zeros_like(modulus), where=modulus > 0)
@@ -176,15 +166,18 @@ class CellSums:
         """The basis of the pressure at the points (q, p)."""
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
-    def _second(self, some: slice) -> Floats:
-        """First and second derivatives of the present energy at the points of some cells (m, q, v)."""
-        cells = np.arange(some.start, some.stop, dtype=np.int32)
-        return np.asarray(self.form.derivatives.second.eval(self.mesh, cells))
-
-    def _volumes(self, some: slice) -> Floats:
-        """The volumes (m, q) [mm3] of the quadrature points of some cells."""
-        slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
-        return np.asarray(np.abs(np.linalg.det(slopes)) * self.kept[0])
+    def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
+        """Cells a chunk at a time: first and second derivatives of the present energy at their points (m, q, v), and the volumes
+        (m, q) [mm3] of these.
+        """
+        for some in self._chunks():
+            cells = np.arange(some.start, some.stop, dtype=np.int32)
+            slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
+            yield (
+                some,
+                self.form.derivatives.second.eval(self.mesh, cells),
+                np.abs(np.linalg.det(slopes)) * self.kept[0],
+            )
 
     def _chunks(self) -> list[slice]:
         return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]
@@ -206,13 +199,6 @@ def _without_pressure(values: Floats, others: int) -> Floats:
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:
     assert array.flags.c_contiguous
     return ctypes.c_void_p(array.ctypes.data)
-
-
-def _unknowns(space: fem.FunctionSpace) -> Places:
-    """The unknowns of each cell, ghosts too: by component of the displacement, then the pressures."""
-    parts = [space.sub(0).sub(component) for component in range(3)]
-    parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
-    return np.concatenate([part.dofmap.list for part in parts], axis=1).astype(np.int32)
 
 
 def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:

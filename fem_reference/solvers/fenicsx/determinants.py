@@ -57,7 +57,7 @@ class Determinants:
 
     def smallest(self, where: str | None = None) -> Extreme:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
-        found = [self._smallest(name, self._at(name)) for name in ([where] if where else self.rest)]
+        found = [self.smallest_of(self._at(name), name) for name in ([where] if where else self.rest)]
         return min(found, key=lambda one: (not np.isnan(one.value), one.value))
 
     def trouble(self, _: Floats, /) -> Trouble | None:
@@ -65,11 +65,8 @@ class Determinants:
         smallest = self.smallest()
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
-    def smallest_of(self, values: Floats) -> Extreme:
-        """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and its place; NaN is smallest."""
-        return self._smallest("quadrature point", values)
-
-    def _smallest(self, where: str, values: Floats) -> Extreme:
+    def smallest_of(self, values: Floats, where: str = "quadrature point") -> Extreme:
+        """The smallest of ``values`` (p,) at points of one kind of this rank's cells, and its place; NaN is smallest."""
         places = self.rest[where]
         return least(self.mesh.comm, values.reshape(places.shape[:2]), self.cells, places, where)
 

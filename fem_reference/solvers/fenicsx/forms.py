@@ -50,7 +50,7 @@ class Form:
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
         """``cells``: the cell of the body for each of this rank's."""
-        self.mesh = msh
+        self.mesh, self.unknowns, self.element = msh, unknowns, settings.element
         self.regions = dict(zip(body.mesh.facets, meshes.local_facets(msh, body.mesh.facets.values()), strict=True))
         self.rule = rule(settings.element, settings.quadrature_degree)
         self.degree = settings.quadrature_degree or DEGREE[settings.element]
@@ -67,15 +67,19 @@ class Form:
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.energy = total_energy(stored, state) * self.dx
-        self.kinetic = self._kinetic(effects)
+        self.kinetic: Any = 0
+        if self.step is not None and (velocity := self.step.velocity) is not None:
+            moving: list[Any] = [effect for effect in effects if "momentum" in effect.needs]
+            self.kinetic = sum(effect.kinetic(_components(velocity)) for effect in moving) * self.dx
         by_place = expand_derivatives(ufl.diff(total_energy(acting, state), variables[1]))
         self.kinds = 3 if isinstance(by_place, Zero) else 4
         self.silent = [_silent(effect, body.frames) for effect in body.effects]
         instants = [*body.frames, *((a + b) / 2 for a, b in pairwise(body.frames))]
-        self._made = {
-            quiet: self._derivatives([one for one, off in zip(acting, quiet, strict=True) if not off], state, variables)
-            for quiet in dict.fromkeys(map(self._quiet, instants))
-        }
+        self._made: dict[tuple[bool, ...], Derivatives] = {}
+        for quiet in dict.fromkeys(map(self._quiet, instants)):
+            kept = [one for one, off in zip(acting, quiet, strict=True) if not off]
+            first, second = _differentiated(total_energy(kept, state), variables, self.kinds)
+            self._made[quiet] = Derivatives(*compiling.expressions(first + second, points, len(first)))
         self.set_amounts(body.frames[0])
         self.loads = self._loads(acting, state, unknowns)
 
@@ -88,16 +92,6 @@ class Form:
     def _quiet(self, frame: float) -> tuple[bool, ...]:
         """True for each effect that is left out at a frame."""
         return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
-
-    def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: tuple[Any, Any, Any]) -> Derivatives:
-        first, second = _differentiated(total_energy(acting, state), by, self.kinds)
-        return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
-
-    def _kinetic(self, effects: list[Any]) -> Any:
-        if self.step is None or self.step.velocity is None:
-            return 0
-        velocity = _components(self.step.velocity)
-        return sum(effect.kinetic(velocity) for effect in effects if "momentum" in effect.needs) * self.dx
 
     def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
         test, loads = ufl.TestFunction(unknowns.function_space), 0

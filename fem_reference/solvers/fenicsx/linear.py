@@ -65,9 +65,8 @@ class Factorised:
         self.preconditioner = self.krylov.getPC()
         self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
         self.preconditioner.setFactorSolverType("mumps")
-        PETSc.Options().setValue(
-            f"{self.krylov.getOptionsPrefix()}pc_precision", precision
-        )  # read at its first factorisation
+        # Read at its first factorisation.
+        PETSc.Options().setValue(f"{self.krylov.getOptionsPrefix()}pc_precision", precision)
         self.krylov.setFromOptions()
         self.preconditioner.setFactorSetUpSolverType()
         self.factors = self.preconditioner.getFactorMatrix()

@@ -113,9 +113,8 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
     nodes = lagrange(cells.kind, cells.degree).points
     order = [int(np.argmin(np.linalg.norm(ours - node, axis=1))) for node in nodes]
     brings = slice(None) if comm.rank == 0 else slice(0)
-    return mesh.create_mesh(
-        comm, cells=np.array(cells.cells[brings][:, order]), e=element, x=np.array(cells.points[brings])
-    )
+    corners, points = np.array(cells.cells[brings][:, order]), np.array(cells.points[brings])
+    return mesh.create_mesh(comm, cells=corners, e=element, x=points)
 
 
 def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:

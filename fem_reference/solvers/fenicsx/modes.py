@@ -195,7 +195,6 @@ def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
 def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
     """The rest position [mm] at which a mode moves most."""
     lengths = np.linalg.norm(_displacements(body, mode), axis=1)
-    i = int(np.argmax(lengths))
-    place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()
-    _, (x, y, z) = max(body.comm.allgather((float(lengths[i]), place)))
+    place = body.displacement.space.tabulate_dof_coordinates()[np.argmax(lengths)].tolist()
+    _, (x, y, z) = max(body.comm.allgather((float(lengths.max()), place)))
     return x, y, z

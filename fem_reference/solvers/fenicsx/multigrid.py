@@ -6,6 +6,8 @@ Pressure block: the mass matrix over local stiffness, which is spectrally equiva
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem.petsc import interpolation_matrix
@@ -14,7 +16,6 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Ints
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, fgmres, iterate
-from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
 _SMOOTHING = 2  # the degree of the polynomial
@@ -22,39 +23,11 @@ _MOST = 200  # iterations; also the excess over a fresh preconditioner that is s
 _STALE = 15
 
 
-class _Blocks:
-    """The block triangular preconditioner: ``cycle`` of the displacements, ``mass`` of the pressures, and their ``coupling``.
-
-    PETSc's solver keeps it, so it must not refer to that solver: neither would ever be freed.
-    """
-
-    cycle: PETSc.PC
-    mass: PETSc.PC
-    coupling: PETSc.Mat
-
-    def __init__(self, sets: list[PETSc.IS]) -> None:
-        self.sets = sets
-
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve first for the pressure, from the volume residual; then for the displacement, from the remaining forces."""
-        forces, volumes = (x.getSubVector(names) for names in self.sets)
-        moves, pressures = (y.getSubVector(names) for names in self.sets)
-        self.mass.apply(volumes, pressures)
-        pressures.scale(-1.0)
-        remaining = forces.duplicate()
-        self.coupling.mult(pressures, remaining)
-        remaining.aypx(-1.0, forces)
-        self.cycle.apply(remaining, moves)
-        for names, given, found in zip(self.sets, (forces, volumes), (moves, pressures), strict=True):
-            x.restoreSubVector(names, given)
-            y.restoreSubVector(names, found)
-
-
 class Multigrid:
     """Solves with the matrix of a ``system`` on one rank, whose element is quadratic and has a pressure."""
 
-    def __init__(self, system: System, spent: Spent) -> None:
-        self.system, self.matrix, self.spent = system, system.matrix, spent
+    def __init__(self, system: System) -> None:
+        self.system, self.matrix, self.spent = system, system.matrix, system.spent
         cells = system.cells
         displaced = np.unique(cells.unknowns[:, : 3 * cells.nodes])
         pressures = np.unique(cells.unknowns[:, 3 * cells.nodes :])
@@ -63,9 +36,6 @@ class Multigrid:
         self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
         self.coarse, self.fixed = self._interpolation(displaced.astype(np.int64))
         self.krylov = fgmres(self.matrix, _MOST)
-        self.krylov.getPC().setType("python")
-        self.blocks = _Blocks(self.sets)
-        self.krylov.getPC().setPythonContext(self.blocks)
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
@@ -89,10 +59,27 @@ class Multigrid:
         return False
 
     def _renew(self) -> None:
-        """Build the preconditioner of the present matrix."""
+        """Build the preconditioner of the present matrix: first the pressure, from the volume residual; then the displacement, from
+        the remaining forces.
+        """
         with self.spent.on("factorisation"):
-            stiff, self.blocks.coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
-            self.blocks.cycle, self.blocks.mass = self._cycle(stiff), self._mass()
+            kinds: Any = PETSc.PC  # its stubs call their members numbers
+            blocks = PETSc.PC().create(self.matrix.comm)
+            blocks.setOperators(self.matrix, self.matrix)
+            blocks.setType("fieldsplit")
+            blocks.setFieldSplitIS(("displacement", self.sets[0]), ("pressure", self.sets[1]))
+            blocks.setFieldSplitType(kinds.CompositeType.SCHUR)
+            blocks.setFieldSplitSchurFactType(kinds.FieldSplitSchurFactType.UPPER)
+            blocks.setFieldSplitSchurPreType(kinds.FieldSplitSchurPreType.USER, self._schur())
+            blocks.setUp()
+            blocks.setReusePreconditioner(True)  # until it is stale
+            moves, pressures = blocks.getFieldSplitSchurGetSubKSP()
+            moves.setType("preonly")
+            moves.setPC(self._cycle(moves.getOperators()[0]))
+            pressures.setType("preonly")
+            pressures.getPC().setType("cholesky")
+            pressures.getPC().setFactorSolverType("mumps")
+            self.krylov.setPC(blocks)
         self.spent.counts["factorisations"] += 1
         self.stale = False
 
@@ -135,20 +122,14 @@ class Multigrid:
         found.data[prescribed | np.isin(found.col, fixed) | (np.abs(found.data) < 1e-12)] = 0.0
         return self._matrix(csr_array(found)), fixed
 
-    def _mass(self) -> PETSc.PC:
-        """The mass matrix of the pressure over local stiffness, solved by a factorisation."""
+    def _schur(self) -> PETSc.Mat:
+        """Minus the mass matrix of the pressure over local stiffness, in place of the Schur complement."""
         system, cells = self.system, self.system.cells
         blocks = cells.softness() * system.tangent.unit**2
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]
         rows, columns = np.repeat(names, names.shape[1], axis=1), np.tile(names, (1, names.shape[1]))
         size = self.sets[1].getSize()
-        mass = self._matrix(csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
-        solver = PETSc.PC().create(self.matrix.comm)
-        solver.setOperators(mass, mass)
-        solver.setType("cholesky")
-        solver.setFactorSolverType("mumps")
-        solver.setUp()
-        return solver
+        return self._matrix(csr_array((-blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
 
     def _matrix(self, found: csr_array) -> PETSc.Mat:
         found.sum_duplicates()

@@ -10,7 +10,6 @@ from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import LinearSolveError
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
-from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
 
 # A step is halved until det F keeps this share of itself everywhere, or down to this length, at which its next state is checked.
@@ -30,9 +29,9 @@ class Newton:
     """
 
     def __init__(
-        self, system: System, linear: LinearSolver, determinants: Determinants, settings: BodySettings, spent: Spent
+        self, system: System, linear: LinearSolver, determinants: Determinants, settings: BodySettings
     ) -> None:
-        self.system, self.linear, self.determinants, self.spent = system, linear, determinants, spent
+        self.system, self.linear, self.determinants = system, linear, determinants
         self.residual, self.most = settings.residual, settings.newton_iterations
         self.step = system.b.duplicate()
         self.thrown = 0
@@ -67,9 +66,8 @@ class Newton:
             try:
                 self.linear.solve(self.system.b, self.step, self._tolerance(scaled, last))
             except LinearSolveError as error:
-                return self._failed(
-                    residuals, f"met a tangent that cannot be solved with ({error}) in iteration {len(residuals)}"
-                )
+                why = f"met a tangent that cannot be solved with ({error}) in iteration {len(residuals)}"
+                return self._failed(residuals, why)
             smallest, last = self._take(smallest), scaled
             if not self.determinants.everywhere(smallest > 0):
                 why = f"turned a cell inside out in iteration {len(residuals)}, however short its step"
@@ -141,7 +139,7 @@ class Newton:
             if self.determinants.everywhere(now > _KEPT * smallest) or share < _SHORTEST:
                 return now
             share /= 2
-            self.spent.counts["halved_steps"] += 1
+            self.system.spent.counts["halved_steps"] += 1
 
 
 def stalled(residuals: list[float]) -> int:

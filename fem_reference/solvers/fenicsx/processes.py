@@ -45,9 +45,8 @@ def installed() -> bool:
 def require_installed() -> None:
     """Raise MissingSoftware where FEniCSx is not installed."""
     if not installed():
-        raise MissingSoftware(
-            "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
-        )
+        way = "pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
+        raise MissingSoftware(f"FEniCSx is not installed: {way}")
 
 
 def mpiexec() -> str | None:
@@ -81,11 +80,9 @@ class Process:
         self.input, self.output, self.error_output = (stream for stream in streams if stream)  # each is a pipe
         self.overran: tuple[Status, str] | None = None  # the reason where a time limit ended it
         self.errors: list[str] = []
-        self.listener = threading.Thread(target=self._listen)
+        said = (line for line in self.error_output if line.strip())
+        self.listener = threading.Thread(target=self.errors.extend, args=(said,))
         self.listener.start()
-
-    def _listen(self) -> None:
-        self.errors.extend(line for line in self.error_output if line.strip())
 
     def solve(self, job: Path, time_limit: float | None, sink: Sink) -> Outcome:
         """Solve the job in a file and sink each frame. The outcome of a process that dies is *crashed*; of one over the time limit,

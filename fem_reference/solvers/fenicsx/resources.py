@@ -19,7 +19,7 @@ LARGE = 350_000
 # Megabytes of a process without a body, of each unknown besides factors (with multigrid, of each unknown in all), and
 # of factors in double precision of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to
 # 560 000 unknowns. MUMPS allocates more than it uses.
-_EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 9.5e-3, 60.0, 1.38
+_EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The most bytes of states, over all frames, that a run keeps by default.
 MOST_STATES = 2**26
 # From this number of unknowns on, a second rank pays, where a core is free for it.
@@ -77,9 +77,8 @@ def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
         needed = memory(count, kind, precision)
         if needed <= free:
             return settings.model_copy(update={"linear_solver": kind, "precision": precision})
-    raise InputError(
-        "memory", f"{needed:.0f} MB for {count} unknowns ({kind})", f"at most the {free:.0f} MB free: larger cells"
-    )
+    got = f"{needed:.0f} MB for {count} unknowns ({kind})"
+    raise InputError("memory", got, f"at most the {free:.0f} MB free: larger cells")
 
 
 def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "multigrid"]]:

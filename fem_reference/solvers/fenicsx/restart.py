@@ -54,13 +54,8 @@ class Restart:
         body = self.body
         arrays = {"unknowns": body.unknowns.x.array} | body.clock.arrays()
         stored: dict[str, Any] = {name: self._gathered(values) for name, values in arrays.items()}
-        own = {"mesh": self.kept.mesh, "recalled": body.recalled is not None}
-        own |= {
-            "acting": self._acting,
-            "clock": body.clock.facts(),
-            "modes": body.modes,
-            "greatest_energy": body.path.greatest,
-        }
+        own = {"mesh": self.kept.mesh, "recalled": body.recalled is not None, "acting": self._acting}
+        own |= {"clock": body.clock.facts(), "modes": body.modes, "greatest_energy": body.path.greatest}
         if body.comm.rank == 0:
             stored["facts"] = np.array(json.dumps(facts | own))
             write_arrays(self.kept.place(frame), stored)

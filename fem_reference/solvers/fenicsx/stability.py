@@ -1,17 +1,9 @@
 """Stability of a state of equilibrium: the number of directions in which its energy falls."""
 
 import numpy as np
-from dolfinx import fem
 
-from fem_reference.effects import Load
-from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.system import System
-
-
-def has_energy(body: Body) -> bool:
-    """True where all effects on ``body`` have an energy, so that its tangent is symmetric; loads may have none."""
-    return not any(isinstance(effect, Load) for effect in body.effects)
 
 
 class Stability:
@@ -22,8 +14,8 @@ class Stability:
     Prescribed unknowns have pivots of 1.
     """
 
-    def __init__(self, system: System, linear: Factorised, unknowns: fem.Function) -> None:
-        space = unknowns.function_space
+    def __init__(self, system: System, linear: Factorised) -> None:
+        space = system.unknowns.function_space
         self.system, self.linear = system, linear
         self.pressures = space.sub(1).collapse()[0].dofmap.index_map.size_global if space.num_sub_spaces > 1 else 0
 

@@ -30,22 +30,15 @@ class System:
     and column of the tangent a 1 on the diagonal.
     """
 
-    def __init__(
-        self,
-        form: Form,
-        unknowns: fem.Function,
-        element: str,
-        conditions: list[PrescribedRegion | PointSprings],
-        spent: Spent,
-    ) -> None:
-        space = unknowns.function_space
+    def __init__(self, form: Form, conditions: list[PrescribedRegion | PointSprings], spent: Spent) -> None:
+        unknowns, space = form.unknowns, form.unknowns.function_space
         self.unknowns, self.conditions, self.spent = unknowns, conditions, spent
         self.index_map, self.block = space.dofmap.index_map, space.dofmap.index_map_bs
         self.owned, self.size = self.index_map.size_local * self.block, len(unknowns.x.array)
         self.fixed: NDArray[np.bool_] = np.zeros(self.size, bool)
         for one in conditions:
             self.fixed[one.exact] = True
-        self.cells = CellSums(form, unknowns, element)
+        self.cells = CellSums(form)
         structure = self.structure = self.cells.structure()
         self.tangent = Tangent(np.zeros(len(structure.columns) + 1), self.cells.places(structure, self.fixed))
         self.scale = np.ones(self.size)  # of the unknowns of linear systems

@@ -108,25 +108,17 @@ class Validity:
         scalars: dict[str, float] = {}
         found: list[Outside] = []
         outside = np.zeros(len(self.cells), bool)
+        acting = [effect for effect in self.effects if effect.amount(frame) != 0]
+        limits = [(name_of(effect), limit) for effect in acting for limit in effect.limits()]
         for measure in self.values:
             means = self._means(measure)
             low, high = self._extreme(means), self._extreme(means, -1.0)
             scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
-            for law, limit in self._limits(measure, frame):
+            for law, limit in [one for one in limits if one[1].measure == measure]:
                 outside |= (means < limit.low) | (means > limit.high)
                 found += [Outside(law, limit, low)] if low.value < limit.low else []
                 found += [Outside(law, limit, high)] if high.value > limit.high else []
         return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
-
-    def _limits(self, measure: str, frame: float) -> list[tuple[str, Limit]]:
-        """The limits on a measure by laws that act at a frame, by name of the law."""
-        return [
-            (name_of(effect), limit)
-            for effect in self.effects
-            if effect.amount(frame) != 0
-            for limit in effect.limits()
-            if limit.measure == measure
-        ]
 
     def _means(self, measure: str) -> Floats:
         """The means over the cells of this rank (n,)."""

@@ -59,8 +59,8 @@ class Worker:
         off.
         """
         frames, settings = self.job.body.frames, self.settings
-        first, good = settings.first_step, () if self.restart is None else self.restart.good()
-        if self.restart is None or not good:
+        first, good = settings.first_step, self.restart.good() if self.restart else ()
+        if not self.restart or not good:
             self.report_frame(Step(frames[0], size=first))
         else:
             facts = self.restart.go_on(good)

@@ -66,9 +66,8 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     def cost() -> dict[str, float]:
         return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
 
-    for step in march(
-        march_of.attempt, body.frames, StepSizes(settings.first_step, settings.smallest_step, stops=body.stops)
-    ):
+    sizes = StepSizes(settings.first_step, settings.smallest_step, stops=body.stops)
+    for step in march(march_of.attempt, body.frames, sizes):
         for name, count in zip(counts, (step.iterations, step.steps, step.cutbacks), strict=True):
             counts[name] += count
         if not step.last.converged:

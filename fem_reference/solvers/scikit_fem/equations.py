@@ -1,7 +1,7 @@
 """The equations of a body: residual and tangent, summed from what acts, each differentiated by jets."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -39,7 +39,8 @@ class Equations:
         self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element[:2]])
         inside = self.space.inside
         if body.fibre is not None and any("fibre" in effect.needs for effect in body.effects):
-            inside = inside.with_fibre(body.fibre)
+            cells, places = np.repeat(inside.cells, inside.places.shape[1]), inside.places.reshape(-1, 3)
+            inside = replace(inside, fibre=body.fibre(cells, places).reshape(inside.places.shape))
         self.inside = inside
         self.parts = [_Part(inside, self._energy_law, self._felt())]
         loads = [effect for effect in body.effects if isinstance(effect, Load)]
@@ -149,11 +150,9 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
     """The virtual work of springs that pull towards what is prescribed."""
-    wanted = entry.path(points.places.reshape(-1, 3), frame)
-    pull = [
-        entry.stiffness * (jets[9 + i] - wanted[:, i]) if i in entry.components else constant(0.0, jets[0])
-        for i in range(3)
-    ]
+    wanted, pull = entry.path(points.places.reshape(-1, 3), frame), [constant(0.0, jets[0])] * 3
+    for i in entry.components:
+        pull[i] = entry.stiffness * (jets[9 + i] - wanted[:, i])
     return _along_displacement(pull)
 
 

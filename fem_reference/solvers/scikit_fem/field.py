@@ -6,6 +6,7 @@ within it); gradients are turned back into space.
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -23,12 +24,8 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above leave no correct digit
-_ELEMENTS = {
-    (2, 1): skfem.ElementLineP1,
-    (2, 2): skfem.ElementLineP2,
-    (3, 1): skfem.ElementTriP1,
-    (3, 2): skfem.ElementTriP2,
-}
+# By corners of a cell, of orders 1 and 2.
+_ELEMENTS = {2: (skfem.ElementLineP1, skfem.ElementLineP2), 3: (skfem.ElementTriP1, skfem.ElementTriP2)}
 
 
 class ScikitFieldSettings(Record):
@@ -64,7 +61,7 @@ def flat(mesh: FieldMesh) -> Flat:
 def space(problem: FieldProblem) -> tuple[Any, Flat]:
     """The basis of the problem's elements and the flat mesh that it stands on."""
     laid = flat(problem.mesh)
-    element = _ELEMENTS[problem.mesh.cells.shape[1], problem.order]()
+    element = _ELEMENTS[problem.mesh.cells.shape[1]][problem.order - 1]()
     return skfem.Basis(laid.mesh, element, intorder=QUADRATURE_DEGREE), laid
 
 
@@ -75,9 +72,8 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
 
     def state(function: Any) -> FieldState:
         gradient = np.einsum("mda,amq->dmq", laid.frames, grad(function))
-        return FieldState(
-            np.asarray(function), tuple(gradient), np.einsum("maq,amq->m", slope_of, grad(function))[:, None]
-        )
+        laplacian = np.einsum("maq,amq->m", slope_of, grad(function))[:, None]
+        return FieldState(np.asarray(function), tuple(gradient), laplacian)
 
     nothing = FieldState(0.0, (0.0,) * problem.mesh.points.shape[1])
 
@@ -119,9 +115,8 @@ def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
             factors = splu(inner)
         except RuntimeError:  # what SuperLU raises where a pivot is zero
             return _failed(len(b), "the equations have no unique solution")
-        inverse = LinearOperator(
-            inner.shape, factors.solve, lambda x: factors.solve(x, "T"), factors.solve, dtype=inner.dtype
-        )
+        solve, transposed = factors.solve, partial(factors.solve, trans="T")
+        inverse = LinearOperator(inner.shape, solve, transposed, solve, dtype=inner.dtype)
         condition = onenormest(inverse) * norm(inner, 1)
         if not condition < _SINGULAR:
             return _failed(len(b), f"the equations have no unique solution (condition number {condition:.1e})")

@@ -15,26 +15,17 @@ from skfem.quadrature import get_quadrature
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.fibres import Directions
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 
 VARIABLES = 13
 DISPLACEMENT = slice(9, 12)
 PRESSURE = 12
 _REST = np.append(np.eye(3).ravel(), np.zeros(4))
-_MESHES = {
-    ("tetrahedron", 1): skfem.MeshTet1,
-    ("tetrahedron", 2): skfem.MeshTet2,
-    ("hexahedron", 1): skfem.MeshHex1,
-    ("hexahedron", 2): skfem.MeshHex2,
-}
+# By kind of cell, of degrees 1 and 2; of degrees 0 to 2.
+_MESHES = {"tetrahedron": (skfem.MeshTet1, skfem.MeshTet2), "hexahedron": (skfem.MeshHex1, skfem.MeshHex2)}
 _ELEMENTS = {
-    ("tetrahedron", 0): skfem.ElementTetP0,
-    ("tetrahedron", 1): skfem.ElementTetP1,
-    ("tetrahedron", 2): skfem.ElementTetP2,
-    ("hexahedron", 0): skfem.ElementHex0,
-    ("hexahedron", 1): skfem.ElementHex1,
-    ("hexahedron", 2): skfem.ElementHex2,
+    "tetrahedron": (skfem.ElementTetP0, skfem.ElementTetP1, skfem.ElementTetP2),
+    "hexahedron": (skfem.ElementHex0, skfem.ElementHex1, skfem.ElementHex2),
 }
 
 
@@ -59,11 +50,6 @@ class Points:
     def part(self, chosen: slice) -> "Points":
         """The points of some of the cells."""
         return replace(self, **{name: entry[chosen] for name, entry in vars(self).items() if entry is not None})
-
-    def with_fibre(self, fibre: Directions) -> "Points":
-        """The same points in a body with fibres."""
-        cells = np.repeat(self.cells, self.places.shape[1])
-        return replace(self, fibre=fibre(cells, self.places.reshape(-1, 3)).reshape(self.places.shape))
 
     @property
     def rates(self) -> Floats:
@@ -94,11 +80,11 @@ class Space:
         """``degree`` of the polynomials that are integrated exactly on a straight cell."""
         kind, displacement, pressure = ELEMENTS[element]
         self.cells, self.degree = cells, degree
-        self.nodal = _ELEMENTS[kind, displacement]()
+        self.nodal = _ELEMENTS[kind][displacement]()
         self.order = cdist(self.nodal.doflocs, reference_nodes(kind, displacement)).argmin(axis=1)
         here = cells.cells[:, self.order[: cells.cells.shape[1]]]
         self.corners = here[:, : self.nodal.refdom.nnodes]
-        self.mesh = _MESHES[kind, cells.degree](cells.points.T.copy(), here.T.astype(np.int32))
+        self.mesh = _MESHES[kind][cells.degree - 1](cells.points.T.copy(), here.T.astype(np.int32))
         rule = get_quadrature(self.nodal.refdom, degree)
         self.basis = skfem.Basis(self.mesh, self.nodal, quadrature=rule)
         self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm] of the nodes of the displacement
@@ -106,7 +92,7 @@ class Space:
         self.nodes[here] = self.basis.element_dofs[: here.shape[1]].T
         self.pressure = None
         if pressure is not None:
-            element = _ELEMENTS[kind, pressure]()
+            element = _ELEMENTS[kind][pressure]()
             self.pressure = skfem.Basis(self.mesh, element, quadrature=rule, disable_doflocs=True)
         self.size = self.rest.size + (0 if self.pressure is None else self.pressure.N)
 

@@ -93,14 +93,18 @@ def test_a_moving_point_is_where_its_curve_says() -> None:
     assert_allclose(lengths(given, frames), through(*turned), rtol=1e-13)
 
 
-def test_beyond_its_ends_a_curve_stays_and_between_them_it_never_overshoots() -> None:
+def test_beyond_its_ends_a_curve_stays_and_between_them_it_keeps_a_parabola() -> None:
+    """The slopes at inner points are those of parabolas through their neighbours, so that a cubic between two of them is one."""
     given = hinged()
     frames = solved(given, ON_TOP | {"curve": curve((0.5, [5, 1, 12]), (0.7, [5, -1, 12]))})
     assert_allclose(lengths(given, frames), through([5, 1, 12], [5, 0, 12], [5, -1, 12]), rtol=1e-13)
-    # A cubic spline through these would exceed 1 at 0.6 rad; a monotone one has there what it has at its neighbours.
-    flat = ((0.0, [5, 0, 12]), (0.55, [5, 1, 12]), (0.65, [5, 1, 12]), (1.2, [5, 0, 12]))
-    frames = solved(given, ON_TOP | {"curve": curve(*flat)})
-    assert_allclose(lengths(given, frames), through([5, 0, 12], [5, 1, 12], [5, 0, 12]), rtol=1e-13)
+
+    def place(angle: float) -> list[float]:
+        return [5 - angle, 1 + 2 * angle**2, 12 + 3 * angle - angle**2]
+
+    bent = curve(*((angle, place(angle)) for angle in (0.0, 0.3, 0.8, 1.2)))
+    frames = solved(given, ON_TOP | {"curve": bent})
+    assert_allclose(lengths(given, frames), through(*(place(angle) for angle in (0.0, 0.6, 1.2))), rtol=1e-12)
 
 
 def test_a_point_left_out_leaves_the_others_where_they_are() -> None:

@@ -28,7 +28,7 @@ def sums(mesh: Cells, element: str, bulk: float = 10.0) -> CellSums:
     there = meshes.distribute(MPI.COMM_SELF, mesh)
     unknowns, cells = meshes.unknowns(there, element), np.asarray(there.topology.original_cell_index, np.int64)
     body = Body(mesh, acting, (), (0.0, 1.0))
-    return CellSums(Form(there, body, unknowns, BodySettings(element=element), cells), unknowns, element)
+    return CellSums(Form(there, body, unknowns, BodySettings(element=element), cells))
 
 
 def test_what_stabilises_a_pressure_is_its_variance_in_each_cell() -> None:

@@ -1,0 +1,116 @@
+"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import qmc
+
+from fem_reference.assessment import chaos
+from fem_reference.assessment.chaos import Chaos
+from fem_reference.assessment.uncertainty import Band, Parameter
+from fem_reference.foundations.mesh import Floats
+
+# The greatest error of a surrogate whose sensitivities are stated and whose band is taken, as a share of the variance.
+WORST = 0.05
+# The share of runs that may lack: more of them might lie beyond the 5th or the 95th percentile, all of them.
+MISSING = 0.05
+# The fewest runs whose own 5th and 95th percentile are between their values.
+FEWEST = 20
+PERCENTILES = (0.05, 0.5, 0.95)
+_SAMPLES = 15  # as a power of 2
+_SHARE = 1e-6  # of the variance of a field, in what is left out of it
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The ``parameters`` and their ``points`` (n, d) from -1 to 1 in the runs that have answers, of ``wanted`` runs."""
+
+    parameters: tuple[Parameter, ...]
+    points: Floats
+    wanted: int
+
+    @property
+    def refused(self) -> str:
+        """The reason why these runs are too few for a band, empty where they are not."""
+        made, variables = len(self.points), self.points.shape[1]
+        if made < 2 * (variables + 1):
+            return f"{made} runs have answers, and {2 * (variables + 1)} are the fewest for {variables} parameters"
+        if self.wanted - made > MISSING * self.wanted:
+            lost = f"{self.wanted - made} of {self.wanted} runs have no answer"
+            return f"{lost}: they might all lie beyond the 5th or the 95th percentile"
+        return ""
+
+
+def sampled(variables: int, runs: int, seed: int) -> Floats:
+    """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable once in each of so many equal parts of its range."""
+    return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
+
+
+def of_values(band: Band, design: Design, values: Floats) -> Band:
+    """The ``band`` filled from the ``values`` (n, f) of the runs, in the frames in which its nominal answer is a number."""
+    defined = np.isfinite(band.nominal)
+    known = values[:, defined]
+    refused = design.refused or _not_numbers(known)
+    if refused:
+        return replace(band, refused=refused)
+    surrogate = chaos.fit(design.points, known)
+    if surrogate is None:
+        return _filled(replace(band, by="runs"), defined, np.repeat(known[:1], 3, axis=0))
+    return _banded(band, design, surrogate, defined, known, surrogate(_samples(design)))
+
+
+def of_field(band: Band, design: Design, products: Floats) -> Band:
+    """The ``band`` of the root mean square of a field over its weights, from the ``products`` (f, n, n) of the weighted fields of
+    each two runs in each frame. The surrogate is of the field, by its principal components: a distance itself has a kink at 0.
+    """
+    if refused := design.refused or _not_numbers(products):
+        return replace(band, refused=refused)
+    runs = np.sqrt(np.maximum(np.einsum("fii->if", products), 0.0))
+    values, vectors = np.linalg.eigh(products.sum(axis=0))
+    kept = values > _SHARE * max(values.sum(), 0.0) / len(values)
+    scales = np.sqrt(values[kept])
+    surrogate = chaos.fit(design.points, vectors[:, kept] * scales) if kept.any() else None
+    every = np.isfinite(band.nominal)
+    if surrogate is None:
+        return _filled(replace(band, by="runs"), every, np.repeat(runs[:1], 3, axis=0))
+    modes = vectors[:, kept] / scales
+    shapes = np.einsum("ia,fij,jb->fab", modes, products, modes)
+    found = surrogate(_samples(design))
+    squares = np.stack([((found @ shape) * found).sum(axis=1) for shape in shapes], axis=1)
+    return _banded(band, design, surrogate, every, runs, np.sqrt(np.maximum(squares, 0.0)))
+
+
+def _banded(band: Band, design: Design, surrogate: Chaos, defined: Floats, runs: Floats, predicted: Floats) -> Band:
+    """The ``band`` by what a surrogate ``predicted`` (s, f), or where that is too bad by the ``runs`` (n, f) themselves."""
+    band = replace(band, error=surrogate.error)
+    if surrogate.error <= WORST:
+        keys = [one.key for one in design.parameters]
+        first, total = (dict(zip(keys, map(float, one), strict=True)) for one in (surrogate.first, surrogate.total))
+        found = np.quantile(predicted, PERCENTILES, axis=0)
+        return _filled(replace(band, by="surrogate", first=first, total=total), defined, found)
+    missed = f"the surrogate misses {100 * surrogate.error:.0f} % of the variance at runs that it was not fitted to"
+    why = f"{missed}, more than {100 * WORST:.0f} %"
+    if len(runs) < FEWEST:
+        return replace(
+            band, unreliable=why, refused=f"{why}, and {len(runs)} runs are too few for percentiles of their own"
+        )
+    return _filled(replace(band, by="runs", unreliable=why), defined, np.quantile(runs, PERCENTILES, axis=0))
+
+
+def _filled(band: Band, defined: Floats, found: Floats) -> Band:
+    """The ``band`` with the percentiles ``found`` (3, k) in the ``defined`` frames."""
+    whole = np.full((3, len(band.nominal)), math.nan)
+    whole[:, defined] = found
+    return replace(band, low=whole[0], median=whole[1], high=whole[2])
+
+
+def _samples(design: Design) -> Floats:
+    """Points at which a surrogate is asked."""
+    return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)
+
+
+def _not_numbers(values: Floats) -> str:
+    """The reason against values that are not all numbers, empty where they are."""
+    bad = int((~np.isfinite(values)).sum())
+    return f"{bad} values of runs are not numbers" if bad else ""

@@ -1,0 +1,189 @@
+"""Parameters of a case fitted to measurements: least squares, confidence intervals, and what the measurements do not determine."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+from scipy.optimize import least_squares
+
+from fem_reference.assessment.judge import in_unit
+from fem_reference.assessment.uncertainty import Parameter
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.io import files
+from fem_reference.io.texts import plain
+
+COLUMNS = ("frame", "quantity", "value", "unit", "sd")
+CONFIDENCE = 0.95
+# Of a parameter's range: a step of differences, and how near to an end a value is at it.
+_STEP, _AT = 1e-3, 1e-3
+# Estimates whose errors are correlated by more than this are named as a pair.
+_CORRELATED = 0.95
+# A combination of parameters is not determined at all where its singular value is below this share of the greatest.
+_NOTHING = 1e-6
+_WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
+# The values (m,) that runs have where the data have theirs, for each of several points (d,) from 0 to 1 of the ranges.
+Forward = Callable[[Sequence[Floats]], Sequence[Floats]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A measurement: the ``value`` of a ``quantity`` at a ``frame``, with its standard deviation ``sd``, both in ``unit``; its
+    ``place`` in the file.
+    """
+
+    frame: int
+    quantity: str
+    value: float
+    unit: str
+    sd: float
+    place: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter, in the unit of ``parameter``: its ``value`` and confidence interval from ``low`` to ``high``, infinite
+    where the measurements do not determine it; ``at``: the end of the range that it is at, ``"low"``, ``"high"`` or empty.
+    """
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    at: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """True where the interval is narrower than the range that was allowed."""
+        return self.high - self.low < self.parameter.high - self.parameter.low
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Fitted ``estimates`` of a case. ``scatter``: root mean square of what is left, by degree of freedom, in standard deviations
+    of the data: near 1 where law and data agree. ``singular``: values of the matrix of sensitivities, in standard deviations by
+    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: how many points were asked.
+    """
+
+    case: str
+    estimates: tuple[Estimate, ...]
+    rows: tuple[Row, ...]
+    fitted: tuple[float, ...]
+    scatter: float
+    singular: tuple[float, ...]
+    pairs: tuple[tuple[str, str, float], ...]
+    runs: int
+
+
+def read(path: Path, units: Callable[[str, str], str]) -> tuple[Row, ...]:
+    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError where there is none."""
+    head, *lines = files.read_rows(path) or [[]]
+    if tuple(one.strip() for one in head) != COLUMNS:
+        raise InputError(path, f'the first row "{",".join(head)}"', _WANT)
+    return tuple(_row(line, f"{path}: row {i}", units) for i, line in enumerate(lines, start=2))
+
+
+def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Row:
+    if len(line) != len(COLUMNS):
+        raise InputError(place, f"{len(line)} entries", f"{len(COLUMNS)}: {', '.join(COLUMNS)}")
+    frame, quantity, value, unit, sd = (one.strip() for one in line)
+    if not frame.isdecimal():
+        raise InputError(f"{place}: frame", f'"{frame}"', "a frame number")
+    own = units(quantity, f"{place}: quantity")
+    numbers = []
+    for name, text in (("value", value), ("sd", sd)):
+        try:
+            numbers.append(in_unit(f"{text} {unit}".strip(), own))
+        except ValueError as error:
+            raise InputError(
+                f"{place}: {name}", f'"{text} {unit}"', f"a number with a unit like {own}: {error}"
+            ) from error
+    if not numbers[1] > 0:
+        raise InputError(f"{place}: sd", f'"{sd}"', "more than 0: a measurement has a standard deviation")
+    return Row(int(frame), quantity, numbers[0], own, numbers[1], place)
+
+
+def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Row], case: str) -> Calibration:
+    """The parameters within their ranges whose values by ``forward`` are nearest to the measurements, in their standard deviations;
+    from the case's own values on. InputError where there are no more measurements than parameters.
+    """
+    if len(rows) <= len(parameters):
+        raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
+    values, deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
+    known = dict[bytes, Floats]()
+
+    def residuals(points: Sequence[Floats]) -> list[Floats]:
+        asked = [point for point in points if point.tobytes() not in known]
+        for point, found in zip(asked, forward(asked), strict=True):
+            known[point.tobytes()] = _finite((found - values) / deviations)
+        return [known[point.tobytes()] for point in points]
+
+    def slopes(point: Floats, *_: Any) -> Floats:
+        """Differences by steps into the range."""
+        steps = np.where(point < 0.5, _STEP, -_STEP)
+        at, *moved = residuals([point, *(point + np.diag(steps))])
+        return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
+
+    start = np.array([min(max(one.place(one.nominal), 0.01), 0.99) for one in parameters])
+    found = least_squares(lambda point: residuals([point])[0], start, slopes, bounds=(0, 1), xtol=1e-5, ftol=1e-8)
+    result = _judged(found.x, np.asarray(found.fun), slopes(found.x), parameters)
+    fitted = tuple(map(float, values + deviations * found.fun))
+    return replace(result, case=case, rows=tuple(rows), fitted=fitted, runs=len(known))
+
+
+def _finite(residuals: Floats) -> Floats:
+    if not np.isfinite(residuals).all():
+        raise InputError(
+            "calibrate", "values that are not numbers", "ranges of parameters in which the case has them all"
+        )
+    return residuals
+
+
+def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Parameter]) -> Calibration:
+    """Confidence intervals by Student's t from the singular values of the ``slopes`` (m, d), with what is ``left`` (m,)."""
+    freedom = len(left) - len(point)
+    scatter = float(np.sqrt(left @ left / freedom))
+    _, singular, rows = np.linalg.svd(slopes, full_matrices=False)
+    nothing = singular <= _NOTHING * singular[0]
+    inverse = np.where(nothing, 0.0, 1 / np.where(nothing, 1.0, singular))
+    covariance = (rows.T * inverse**2) @ rows
+    unknown = (np.abs(rows[nothing]) > math.sqrt(_NOTHING)).any(axis=0)
+    widths = stats.t.ppf((1 + CONFIDENCE) / 2, freedom) * scatter * np.sqrt(np.diag(covariance))
+    widths = np.where(unknown | (np.abs(slopes).max(axis=0) == 0), np.inf, widths)
+    estimates = tuple(_estimate(one, *at) for one, *at in zip(parameters, point, widths, strict=True))
+    pairs = _pairs(covariance, rows[nothing], parameters)
+    return Calibration("", estimates, (), (), scatter, tuple(map(float, singular)), pairs, 0)
+
+
+def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
+    """The estimate at a ``place`` from 0 to 1 of the range, with a half-width of the same."""
+    at = "low" if place < _AT else "high" if place > 1 - _AT else ""
+    low, value, high = (parameter.at(one) for one in (place - width, place, place + width))
+    return Estimate(parameter, value, low, high, at)
+
+
+def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
+    """The titles of pairs whose errors are correlated, with the correlation: in what is not determined at all where both take part,
+    else in the ``covariance`` of the rest.
+    """
+    lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
+    for i, one in enumerate(parameters):
+        for k, other in enumerate(parameters[:i]):
+            both = lost if min(lost[i, i], lost[k, k]) > _NOTHING else covariance
+            scale = math.sqrt(both[i, i] * both[k, k])
+            correlation = float(both[i, k]) / scale if scale > 0 else 0.0
+            if abs(correlation) > _CORRELATED:
+                found.append((other.title, one.title, correlation))
+    return tuple(found)
+
+
+def facts(found: Calibration) -> dict[str, Any]:
+    """A calibration as valid JSON."""
+    table: dict[str, Any] = plain(asdict(found))
+    for one, row in zip(found.estimates, table["estimates"], strict=True):
+        row["is_known"] = one.is_known
+    return table

@@ -1,0 +1,189 @@
+"""The evidence for each quantity of a muscle: closed forms, other codes, experiments, numerical bar and model band, and a grade."""
+
+import math
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fem_reference.assessment import experiments
+from fem_reference.assessment.catalogue import Entry, Result
+from fem_reference.assessment.experiments import Fact
+from fem_reference.assessment.moment_arms import ArmsBeside
+from fem_reference.foundations.records import Record, parse
+
+FILE = Path(__file__).with_suffix(".toml")
+_ROUNDED = 0.5  # of a share that is published in whole per cent
+# "outside": the model differs from an experiment by more than its uncertainty, whatever else it meets.
+Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
+
+
+class Evidence(Record):
+    """The evidence of a quantity as it is stated: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in
+    words, the numerical ``bar``, facts that are its model ``band``, and its comparisons with experiments.
+    """
+
+    name: str
+    unit: str
+    verified: tuple[str, ...]
+    closed_forms: str
+    other_codes: str
+    bar: str
+    band: str = ""
+    band_of: str = ""
+    experiments: tuple[str, ...] = ()
+    arms: bool = False
+
+
+class _File(Record):
+    quantity: tuple[Evidence, ...]
+
+
+def claims() -> tuple[Evidence, ...]:
+    """The stated evidence, by quantity."""
+    return parse(_File, tomllib.loads(FILE.read_text(encoding="utf-8")), FILE.name).quantity
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A value of the model beside a measured one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
+    specimens, None where unknown; ``validates``: whether being within would count as validation.
+    """
+
+    name: str
+    title: str
+    unit: str
+    value: float
+    truth: float
+    within: float
+    n: int | None
+    met: bool
+    validates: bool
+    remark: str = ""
+
+    @property
+    def is_order(self) -> bool:
+        """True of an order, which is met (1) or not (0), to a half."""
+        return (self.truth, self.within) == (1.0, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A quantity with its evidence: the ``kinds`` of catalogue entries behind it and the ``orders`` that they must show; the
+    ``band`` of facts, least and greatest; comparisons ``beside`` experiments.
+    """
+
+    claim: Evidence
+    kinds: Mapping[str, int]
+    orders: tuple[float, ...]
+    band: tuple[Fact, ...]
+    beside: tuple[Beside, ...]
+
+    @property
+    def met(self) -> int:
+        """The number of comparisons within their uncertainty."""
+        return sum(one.met for one in self.beside)
+
+    @property
+    def misses(self) -> tuple[float, ...]:
+        """The deviations from measured numbers, orders left out, over their uncertainties."""
+        return tuple((one.value - one.truth) / one.within for one in self.beside if not one.is_order)
+
+    @property
+    def bias(self) -> float:
+        """The mean of these; NaN for none."""
+        return float(np.mean(self.misses)) if self.misses else math.nan
+
+    @property
+    def scatter(self) -> float:
+        """Their standard deviation; NaN for none."""
+        return float(np.std(self.misses)) if self.misses else math.nan
+
+    @property
+    def grade(self) -> Grade:
+        """Outside where one comparison is, else validated by one that counts, indicative by others; verified only where no
+        experiment is known, and not measured where its data is not here.
+        """
+        if not self.beside:
+            return "not measured" if self.claim.arms or self.claim.experiments else "verified only"
+        if self.met < len(self.beside):
+            return "outside"
+        return "validated" if any(one.validates for one in self.beside) else "indicative"
+
+
+def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
+    """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
+
+    KeyError where an experiment was not measured, LookupError where a group of the catalogue does not exist.
+    """
+    behind = [one for one in entries if one.group in claim.verified]
+    if missing := set(claim.verified) - {one.group for one in behind}:
+        raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
+    orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
+    beside = [of_result(results[name]) for name in claim.experiments]
+    beside += [of_arms(one) for one in arms] if claim.arms else []
+    kinds, band = Counter(str(one.kind) for one in behind), experiments.model_band(claim.band)
+    return Row(claim, kinds, tuple(sorted(orders)), band, tuple(beside))
+
+
+def of_result(found: Result) -> Beside:
+    """A measured entry of the kind experiment; it counts only where every fact does, and no part of its model is from memory."""
+    entry = found.entry
+    from_memory = "memory" in entry.source
+    facts = entry.facts
+    counted = not from_memory and bool(facts) and all(one.validates for one in facts)
+    n = experiments.least_specimens(facts)
+    met = found.word == "within"
+    return Beside(
+        *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
+        remark=found.finding.note,
+    )
+
+
+def of_arms(arms: ArmsBeside) -> Beside:
+    """Moment arms beside a curve or a range: the share inside or the overlap [%] that Modenese and Kohout 2020 reach."""
+    quantity = "share_inside" if arms.is_curve else "overlap"
+    reached = experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " "))
+    words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
+    title = f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.experiment})"
+    share = 100 * arms.share
+    return Beside(
+        *(f"{arms.case}-{arms.experiment}", title, "%", share, reached.value, _ROUNDED, None),
+        *(share >= reached.value - _ROUNDED, False),
+        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; "
+        f"{arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm",
+    )
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
+    None where none is known, and the ``values`` of all quantities by name.
+    """
+
+    law: str
+    parameters: Mapping[str, tuple[float, tuple[float, float] | None]]
+    values: Mapping[str, float]
+    to: tuple[str, ...]
+
+    @property
+    def inside(self) -> bool | None:
+        """True where every parameter with a published range is inside it; None where none has one."""
+        known = [low <= value <= high for value, found in self.parameters.values() if found for low, high in [found]]
+        return all(known) if known else None
+
+
+@dataclass(frozen=True, eq=False)
+class Credibility:
+    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why some are ``missing``, and ``fits`` of laws
+    to the cubes.
+    """
+
+    rows: tuple[Row, ...]
+    arms: tuple[ArmsBeside, ...]
+    missing: Mapping[str, str]
+    fits: tuple[Fitted, ...]

@@ -1,0 +1,120 @@
+"""Moment arms of fibres beside published ones: a polynomial fit of length over angle, the share of poses whose arm is within the
+fibres' range, and the overlap of two ranges.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+
+# As Modenese and Kohout 2020, doi 10.1007/s10439-020-02490-4.
+DEGREE, STEP = 4, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """The least and greatest arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
+
+    angles: Floats
+    low: Floats
+    high: Floats
+
+    def at(self, angles: Floats) -> "Range":
+        """The range at other ``angles`` (b,) [deg], linear in between; NaN where it does not reach."""
+        within = (angles >= self.angles.min()) & (angles <= self.angles.max())
+        low, high = (np.interp(angles, self.angles, side) for side in (self.low, self.high))
+        return Range(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
+
+
+def poses(angles: Floats) -> Floats:
+    """Angles (a,) [deg] in steps of 2 degrees over those of frames (f,) [deg], from the next even one on."""
+    first, last = np.ceil(angles.min() / STEP - 1e-9), np.floor(angles.max() / STEP + 1e-9)
+    return np.asarray(STEP * np.arange(first, last + 1))
+
+
+def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
+    """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the polynomial of fourth degree that fits the ``lengths`` (f, k)
+    [mm] of k fibres at ``angles`` (f,) [deg] best. InputError where too few angles differ.
+    """
+    if len(np.unique(np.round(angles, 9))) <= DEGREE:
+        raise InputError("angles", f"{len(np.unique(angles))} of them", f"more than {DEGREE} that differ")
+    slopes = [Polynomial.fit(angles, length, DEGREE).deriv()(at) for length in lengths.T]
+    return np.asarray(-np.stack(slopes, axis=1) * 180 / np.pi)
+
+
+def range_of(angles: Floats, arms: Floats) -> Range:
+    """The range of the ``arms`` (a, k) [mm] of fibres at ``angles`` (a,) [deg]."""
+    return Range(angles, arms.min(axis=1), arms.max(axis=1))
+
+
+def share_inside(curve: Floats, found: Range) -> float:
+    """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, of those in which it is known; NaN for
+    none. A range that is not a number contains nothing.
+    """
+    known = np.isfinite(curve)
+    if not known.any():
+        return float("nan")
+    inside = (found.low <= curve) & (curve <= found.high)
+    return float(inside[known].mean())
+
+
+def overlap(found: Range, published: Range) -> float:
+    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN where no pose is known."""
+    known = np.isfinite(published.low) & np.isfinite(published.high)
+    if not known.any():
+        return float("nan")
+    common = np.minimum(found.high, published.high) - np.maximum(found.low, published.low)
+    covered = np.nan_to_num(np.maximum(common, 0.0)) / (published.high - published.low)
+    return float(covered[known].mean())
+
+
+@dataclass(frozen=True, eq=False)
+class ArmsBeside:
+    """Arms of a muscle's fibres in a run of ``case`` beside a published curve or range of an ``experiment``: at ``angles`` (a,)
+    [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, the ``published`` range, whose sides are equal where
+    it is one curve.
+
+    ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run; ``coarser``: the greatest change
+    of the mean arm over the poses [mm] on larger tetrahedra.
+    """
+
+    case: str
+    muscle: str
+    sense: str
+    experiment: str
+    setting: str
+    found: Range
+    middle: Floats
+    published: Range
+    coarser: float
+
+    @property
+    def is_curve(self) -> bool:
+        """True where one curve was published, not a range."""
+        return bool(np.array_equal(self.published.low, self.published.high, equal_nan=True))
+
+    @property
+    def share(self) -> float:
+        """The share of poses inside for a curve, else the overlap."""
+        return share_inside(self.published.low, self.found) if self.is_curve else overlap(self.found, self.published)
+
+    @property
+    def bias(self) -> float:
+        """The mean of the fibres' mean arm less the published one, of a range its middle, over the poses where that is known [mm];
+        NaN for none.
+        """
+        return float(self._off.mean()) if self._off.size else float("nan")
+
+    @property
+    def scatter(self) -> float:
+        """The standard deviation of that difference over the poses [mm]; NaN for none."""
+        return float(self._off.std()) if self._off.size else float("nan")
+
+    @property
+    def _off(self) -> Floats:
+        centre = (self.published.low + self.published.high) / 2
+        known = np.isfinite(centre)
+        return np.asarray((self.middle - centre)[known])

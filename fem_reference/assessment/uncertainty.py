@@ -1,0 +1,192 @@
+"""The band of answers that unknown parameters of a case allow, with the sensitivities, as records; and a candidate beside it."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.io.texts import plain
+
+FORMAT = 1
+Place = Literal["inside", "undecided", "outside", ""]
+# Of the width of a band: rounding at its ends.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a case by its ``key``, its ``title`` in words, its value in the case (``nominal``) and its range, in ``unit``."""
+
+    key: str
+    title: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    spread: str
+    source: str
+
+    @property
+    def contains(self) -> bool:
+        """True where the case's own value is within the range."""
+        return self.low <= self.nominal <= self.high
+
+    def value(self, place: float) -> float:
+        """The value at a ``place`` from -1 to 1 of the range, to six digits.
+
+        >>> Parameter("k", "k", "", 1.0, 1.0, 100.0, "log-uniform", "").value(0.0)
+        10.0
+        """
+        return float(f"{self.at((place + 1) / 2):.6g}")
+
+    def at(self, share: float) -> float:
+        """The value at a ``share`` from 0 to 1 of the range, and beyond it; :meth:`place` is its inverse."""
+        if self.spread == "log-uniform":
+            with np.errstate(over="ignore"):
+                return float(np.exp(math.log(self.low) + share * math.log(self.high / self.low)))
+        return float(self.low + share * (self.high - self.low))
+
+    def place(self, value: float) -> float:
+        """The share of the range below a ``value``."""
+        if self.spread == "log-uniform":
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A run of the design that has no answer: its parameters by key, and its end."""
+
+    values: dict[str, float]
+    status: str
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
+    ``high`` (f,) beside the case's own answer ``nominal``; NaN where the quantity is not defined. ``bar`` (f,): the numerical error
+    bar of that answer, None where it has none. ``distance``: True of a distance from that answer, where less is always inside.
+
+    ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN where there is none.
+    ``by`` ``"surrogate"`` or ``"runs"``; ``refused``: why there is no band, empty where there is one. ``first`` and ``total``: by
+    key of the parameter the share of the variance over all frames; empty where the surrogate is too bad to say (``unreliable``).
+    """
+
+    quantity: str
+    title: str
+    unit: str
+    numbers: tuple[int, ...]
+    nominal: Floats
+    low: Floats
+    median: Floats
+    high: Floats
+    bar: Floats | None = None
+    distance: bool = False
+    error: float = math.nan
+    by: str = ""
+    refused: str = ""
+    unreliable: str = ""
+    first: dict[str, float] = field(default_factory=dict)
+    total: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def width(self) -> float:
+        """The greatest width over the frames, NaN without a band."""
+        widths = self.high - (0.0 if self.distance else self.low)
+        return float(np.nanmax(widths)) if np.isfinite(widths).any() else math.nan
+
+    @property
+    def greatest_bar(self) -> float:
+        """The greatest error bar over the frames, NaN where there is none."""
+        known = self.bar is not None and np.isfinite(self.bar).any()
+        return float(np.nanmax(self.bar)) if known else math.nan  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A candidate beside a band: its ``values`` (f,), and by frame its ``places``, empty where there is no band or no value is
+    expected.
+    """
+
+    candidate: str
+    quantity: str
+    values: Floats
+    places: tuple[Place, ...]
+    beyond: Floats
+
+    @property
+    def word(self) -> str:
+        """The worst place over the frames; empty where there is none."""
+        found = set(self.places)
+        return next((word for word in ("outside", "undecided", "inside") if word in found), "")
+
+    @property
+    def share(self) -> float:
+        """The share of the frames that are inside, NaN where none counts."""
+        counted = [one for one in self.places if one]
+        return counted.count("inside") / len(counted) if counted else math.nan
+
+    @property
+    def worst(self) -> float:
+        """The farthest beyond the band over the frames, 0 inside; a value that is not a number counts as infinitely far."""
+        counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one]
+        return float(max(counted, default=math.nan))
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """The bands of a case from so many ``runs`` of a design with a ``seed``, of which some are ``failures``; ``fixed``: titles of
+    the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: by candidate, why it has no run; ``seconds``:
+    processor time of a run, on the mean.
+    """
+
+    case: str
+    title: str
+    size: float
+    parameters: tuple[Parameter, ...]
+    fixed: tuple[str, ...]
+    runs: int
+    seed: int
+    failures: tuple[Failure, ...]
+    bands: tuple[Band, ...]
+    placed: tuple[Placed, ...] = ()
+    lost: dict[str, str] = field(default_factory=dict)
+    seconds: float = math.nan
+    origin: dict[str, str] = field(default_factory=dict)
+
+
+def place(candidate: str, band: Band, values: Floats) -> Placed:
+    """A candidate's ``values`` (f,) beside a band: inside and outside by more than the error bar of the reference, else undecided;
+    without a bar nothing is certain.
+    """
+    bar = np.full(len(values), math.nan) if band.bar is None else band.bar
+    above, below = band.high - values, math.inf if band.distance else values - band.low
+    margin = np.where(np.isnan(values), -np.inf, np.minimum(above, below))
+    margin = margin + _ROUNDING * np.nan_to_num(band.high - band.low) + _ROUNDING**2
+    defined = np.isfinite(band.high)
+    places = tuple(
+        _place(float(far), float(here)) if known else "" for far, here, known in zip(margin, bar, defined, strict=True)
+    )
+    return Placed(candidate, band.quantity, values, places, np.maximum(-margin, 0.0))
+
+
+def _place(margin: float, bar: float) -> Place:
+    """The place of a value so far inside a band, negative outside.
+
+    >>> _place(0.5, 0.2), _place(0.1, 0.2), _place(-0.3, 0.2), _place(-0.1, math.nan)
+    ('inside', 'undecided', 'outside', 'undecided')
+    """
+    if margin >= bar:
+        return "inside"
+    return "outside" if margin < -bar or margin == -math.inf else "undecided"
+
+
+def facts(found: Uncertainty) -> dict[str, Any]:
+    """The bands of a case as valid JSON."""
+    table: dict[str, Any] = plain({"format": FORMAT, **vars(found)})
+    for placed, one in zip(found.placed, table["placed"], strict=True):
+        one |= plain({"word": placed.word, "share": placed.share, "worst": placed.worst})
+    return table

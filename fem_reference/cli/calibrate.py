@@ -1,0 +1,35 @@
+"""The verb ``calibrate``: parameters of a case fitted to measurements."""
+
+import argparse
+from pathlib import Path
+
+from fem_reference.assessment.calibration import facts
+from fem_reference.cli import DONE, VERDICT_FAIL, out, write_output
+from fem_reference.cli._parser import share
+from fem_reference.report import calibration_texts
+from fem_reference.scenes import casefile
+from fem_reference.studies import calibration
+from fem_reference.studies.campaign import Workers
+
+HELP = "fit parameters of a case to measured forces, lengths or places, with confidence intervals"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has."""
+    share(parser, "case", "--set")
+    data = "CSV file with the columns frame, quantity, value, unit, sd"
+    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=data)
+    fit = "a number of the case that has a range, such as effect[0].mu; may be repeated"
+    parser.add_argument("--fit", action="append", default=[], metavar="KEY", help=fit)
+    share(parser, "--workers", "--scheduler")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit parameters on the quick size of a case, except for what ``--set`` says; status 1 where one is not determined."""
+    given = dict(map(casefile.setting, options.set))
+    quick = casefile.read_muscle(options.case, given).quick
+    scene = casefile.read_muscle(options.case, quick | given)
+    workers = Workers(options.workers, options.scheduler)
+    found = calibration.calibrate(scene, options.to, options.fit, out(options) / "runs", workers)
+    write_output(facts(found), calibration_texts.text(found), options)
+    return DONE if all(one.is_known and not one.at for one in found.estimates) else VERDICT_FAIL

@@ -1,0 +1,39 @@
+"""The verb ``uncertainty``: the band of answers that the unknown parameters of a case allow."""
+
+import argparse
+
+from fem_reference.assessment.uncertainty import facts
+from fem_reference.cli import DONE, SOLVER_FAILED, out
+from fem_reference.cli._cases import asked, publish
+from fem_reference.cli._parser import positive, share
+from fem_reference.report import uncertainty_page
+from fem_reference.report.asked import Part
+from fem_reference.scenes import casefile
+from fem_reference.studies import uncertainty
+from fem_reference.studies.campaign import Workers
+
+HELP = "vary the unknown parameters of a case within their ranges: bands of the answers, sensitivities; write the page"
+RUNS = 64
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has."""
+    share(parser, "case", "--set")
+    many = f"how many runs of the reference, on the size that the case has for quick solutions (default: {RUNS})"
+    parser.add_argument("--runs", type=positive, default=RUNS, metavar="N", help=many)
+    parser.add_argument("--seed", type=positive, default=1, metavar="N", help="of the design (default: 1)")
+    share(parser, "--workers", "--scheduler", "--name")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve a case with other parameters, and write the page; on its quick size, except for what ``--set`` says."""
+    given = dict(map(casefile.setting, options.set))
+    quick = casefile.read_muscle(options.case, given).quick
+    scene = casefile.read_muscle(options.case, quick | given)
+    workers = Workers(options.workers, options.scheduler)
+    found = uncertainty.study(scene, out(options) / "runs", workers, options.runs, options.seed)
+    more = [Part(("--runs", str(options.runs)), f"runs{options.runs}")] if options.runs != RUNS else []
+    more += [Part(("--seed", str(options.seed)), f"seed{options.seed}")] if options.seed != 1 else []
+    wanted = asked("uncertainty", scene, options, "uncertainty", *more)
+    publish(options, wanted, uncertainty_page.page(found), facts(found), uncertainty_page.text(found))
+    return SOLVER_FAILED if any(band.refused for band in found.bands) else DONE

@@ -1,0 +1,165 @@
+"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves it so over another.
+
+The same flux passes each mm2 of an attachment, so lines that start evenly over one end evenly over the other, and leave no part of
+either out. The gradient of a potential that is constant on attachments gathers at their rims instead: in a sheet whose whole face
+is attached, nearly all lines start at the edge next to the other attachment.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import (
+    TET_FACES,
+    Floats,
+    Ints,
+    Polylines,
+    TetMesh,
+    edge_vectors,
+    tet_volumes,
+    triangle_areas,
+)
+from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
+
+MOST = 1000  # fibres
+_LINES = 1000  # at least so many are followed, and so many for each fibre wanted: those wanted are chosen from them
+_LINES_EACH = 8
+_ROUNDS = 50  # of Lloyd's algorithm; it has settled before
+_PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A flow without divergence through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], of 1 in all, in
+    by the facets ``start`` (m, 3), out by ``end``. ``faces`` (k, 4): the numbers of the triangles opposite the corners of each
+    tetrahedron; ``rises`` (k, 4, 3) [1/mm]: the gradients of its barycentric coordinates.
+    """
+
+    mesh: TetMesh
+    start: Ints
+    end: Ints
+    faces: Ints
+    rises: Floats
+    slopes: Floats
+
+    @property
+    def field(self) -> FibreField:
+        """The directions of the flow, continuous: at each point the flow in the tetrahedra around it, averaged by volume."""
+        no_values = np.full(len(self.mesh.points), np.nan)  # the potential is not constant on attachments
+        return FibreField(self.mesh, no_values, averaged(self.mesh, self.slopes), self.start, self.end)
+
+
+def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
+    """The flow from the facets ``start`` of a ``mesh`` to ``end``, even over the area of each, and none through the rest of the
+    boundary: the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
+
+    By Crouzeix and Raviart's elements, whose gradients are the lowest order of Raviart and Thomas: what leaves a tetrahedron
+    enters the next exactly (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    """
+    triangles = np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1)
+    _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
+    faces, count = numbers.reshape(-1, 4), len(first)
+    inverse = np.linalg.inv(edge_vectors(mesh.points[mesh.tets]))
+    rises = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    volumes = tet_volumes(mesh.points, mesh.tets)
+    stiffness = 9 * volumes[:, None, None] * np.einsum("kia,kja->kij", rises, rises)
+    rows, columns = np.broadcast_arrays(faces[:, :, None], faces[:, None, :])
+    matrix = csc_array(coo_array((stiffness.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count)))
+    through = np.zeros(count)
+    for facets, sign in ((mesh.facets[start], -1.0), (mesh.facets[end], 1.0)):
+        areas = triangle_areas(mesh.points, facets)
+        through[_numbers(triangles[first], facets)] += sign * areas / areas.sum()
+    potential = np.zeros(count)  # free by a constant: 0 on the first face
+    potential[1:] = splu(matrix[1:, 1:]).solve(through[1:])
+    slopes = -3 * np.einsum("ki,kia->ka", potential[faces], rises)
+    return Flow(mesh, mesh.facets[start], mesh.facets[end], faces, rises, slopes)
+
+
+def streamlines(flux: Flow, count: int) -> Polylines:
+    """``count`` lines of 40 points each along a ``flux``, each for the same area of both attachments; InputError where there are
+    fewer.
+
+    Many lines start evenly over the area; those kept are the middles of groups that are compact at both ends (Lloyd 1982), in units
+    of the size of each attachment.
+    """
+    if count > MOST:
+        raise InputError("fibres.traced.count", count, f'at most {MOST} with flux = "area"')
+    lines = _followed(flux, *_starts(flux, max(_LINES, _LINES_EACH * count)))
+    sizes = [np.sqrt(triangle_areas(flux.mesh.points, facets).sum()) for facets in (flux.start, flux.end)]
+    ends = np.array([[line[0] / sizes[0], line[-1] / sizes[1]] for line in lines]).reshape(-1, 6)
+    kept = _middles(ends, count) if len(lines) >= count else np.arange(len(lines))
+    if len(kept) < count:
+        raise InputError("fibres.traced.count", count, f"at most {len(kept)}, the fibres that could be traced")
+    return Polylines(np.concatenate([resample(lines[i]) for i in kept]), np.arange(count + 1) * POINTS)
+
+
+def _numbers(triangles: Ints, facets: Ints) -> Ints:
+    """The number (m,) of each of ``facets`` (m, 3) among sorted ``triangles`` (n, 3), each with its corners in order."""
+    _, numbers = np.unique(np.concatenate([triangles, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
+    return np.asarray(numbers.ravel()[len(triangles) :])
+
+
+def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
+    """``count`` places (n, 3) [mm], evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
+    mesh, facets = flux.mesh, flux.start
+    shares = np.cumsum(triangle_areas(mesh.points, facets))
+    facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on the rim of one
+    square = (0.5 + np.arange(1, count + 1)[:, None] / _PLASTIC ** np.array([1, 2])) % 1
+    beyond = square.sum(axis=1) > 1
+    square[beyond] = 1 - square[beyond]  # the half of the square that is a triangle, for the other
+    weights = np.column_stack([1 - square.sum(axis=1), square])
+    triangles = np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1)
+    on = {tuple(corners): number // 4 for number, corners in enumerate(triangles.tolist())}
+    tets = np.array([on[tuple(corners)] for corners in np.sort(facets, axis=1).tolist()])
+    return tets[facet], np.einsum("ni,nia->na", weights, mesh.points[facets[facet]])
+
+
+def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
+    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that end where the flow leaves, straight in each tetrahedron."""
+    beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
+    passed, leaves = [(going, points)], np.zeros(len(points), bool)
+    for _ in range(len(flux.mesh.tets)):  # a line passes each once
+        local = np.einsum("nia,na->ni", flux.rises[tets], points - flux.mesh.points[flux.mesh.tets[tets, 0]])
+        rates = np.einsum("nia,na->ni", flux.rises[tets], flux.slopes[tets])
+        local[:, 0] += 1
+        out = (rates < 0) & (flux.faces[tets] != met[:, None])
+        times = np.where(out, np.maximum(local, 0) / np.where(out, -rates, 1.0), np.inf)
+        side = np.argmin(times, axis=1)
+        time, after, met = np.min(times, axis=1), beyond[tets, side], flux.faces[tets, side]
+        points = points + np.where(np.isfinite(time), time, 0.0)[:, None] * flux.slopes[tets]
+        passed.append((going, points))
+        leaves[going[(after < 0) & np.isfinite(time)]] = True
+        on = (after >= 0) & np.isfinite(time)
+        going, points, tets, met = going[on], points[on], after[on], met[on]
+        if len(going) == 0:
+            break
+    numbers, places = (np.concatenate(parts) for parts in zip(*passed, strict=True))
+    order = np.argsort(numbers, kind="stable")
+    lines = np.split(places[order], np.cumsum(np.bincount(numbers))[:-1])
+    return [line for line, left in zip(lines, leaves, strict=True) if left]
+
+
+def _neighbours(faces: Ints) -> Ints:
+    """The tetrahedron (k, 4) beyond each of the ``faces`` (k, 4) of tetrahedra, -1 on the boundary."""
+    order = np.argsort(faces.ravel(), kind="stable")
+    twice = np.flatnonzero(np.diff(faces.ravel()[order]) == 0)
+    one, other = order[twice], order[twice + 1]
+    beyond = np.full(faces.size, -1)
+    beyond[one], beyond[other] = other // 4, one // 4
+    return beyond.reshape(-1, 4)
+
+
+def _middles(points: Floats, count: int) -> Ints:
+    """The indices of at most ``count`` of ``points`` (n, d): the one next to the middle of each group of Lloyd's algorithm."""
+    middles = spread(points, count)
+    for _ in range(_ROUNDS):
+        _, group = cKDTree(middles).query(points)
+        sizes = np.maximum(np.bincount(group, minlength=count), 1)
+        middles = np.stack([np.bincount(group, weights=axis, minlength=count) / sizes for axis in points.T], axis=1)
+    off, group = cKDTree(middles).query(points)
+    order = np.lexsort((off, group))
+    return np.asarray(order[np.unique(group[order], return_index=True)[1]])

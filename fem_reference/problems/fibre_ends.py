@@ -1,0 +1,134 @@
+"""The ends of a muscle's fibres: the attachment that each belongs to, and its distance from that."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.distance import Distances, distances
+from fem_reference.geometry.exemption import Exemption
+from fem_reference.problems.setup import AttachedVertices
+
+# An end this far [mm] from its attachment does not reach it; within that the muscle is as good as attached there.
+REACHES = 2.0
+SIDES = ("first", "last")  # ends of a fibre
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class FibreEnds:
+    """The first and the last end of k fibres: ``by`` (k, 2), the index of the attachment in ``attached`` that each belongs to, its
+    ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that.
+
+    An end that does not reach its attachment goes on by the tendon of that, where it has one.
+    """
+
+    attached: tuple[AttachedVertices, ...]
+    by: Ints
+    distance: Floats
+    closest: Floats
+
+    @cached_property
+    def tendons(self) -> Floats:
+        """The points (k, 2, 3) [mm] of bones at rest to which ends go on; NaN where they do not."""
+        points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
+        return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
+
+    @property
+    def beside(self) -> Bools:
+        """Mask (k, 2) of the ends that neither reach their attachment nor go on by a tendon."""
+        return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
+
+    def taken(self, rest: Floats, frame: float) -> Floats:
+        """The places (k, 2, 3) [mm] to which the bones take the ends from ``rest`` (k, 2, 3) [mm], by a ``frame``."""
+        found = np.array(rest)
+        for i, one in enumerate(self.attached):
+            found[self.by == i] = apply(one.bone.pose(frame), rest[self.by == i])
+        return found
+
+    def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
+        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from where bones take them from ``rest`` (k, 2, 3); 0
+        with a tendon, which ends at its bone.
+        """
+        away = np.linalg.norm(ends - self.taken(rest, frame), axis=2)
+        return np.where(np.isnan(self.tendons[:, :, 0]) | np.isnan(away), away, 0.0)
+
+    def beyond(self, ends: Floats, frame: float) -> Floats:
+        """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 without."""
+        lengths = np.linalg.norm(self.taken(self.tendons, frame) - ends, axis=2)
+        return np.asarray(np.where(np.isnan(self.tendons[:, :, 0]), 0.0, lengths).sum(axis=1))
+
+    def named(self, fibre: int, side: int) -> str:
+        """An end in words."""
+        return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}"
+
+    @cached_property
+    def facts(self) -> dict[str, float | str]:
+        """The number of ends, of those that go on by a tendon, and of those beside their attachment; of these all by name."""
+        found: dict[str, float | str] = {"fibre_ends": float(self.by.size)}
+        found["fibre_ends_beyond_2_mm"] = float(self.beside.sum())
+        if np.isfinite(self.tendons).any():
+            found["fibre_ends_by_tendon"] = float(np.isfinite(self.tendons[:, :, 0]).sum())
+        if self.beside.any():
+            found["fibre_end_farthest_mm"] = float(self.distance[self.beside].max())
+            names = (f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in np.argwhere(self.beside).tolist())
+            found["fibre_ends_not_attached"] = "; ".join(names)
+        return found
+
+
+def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:
+    """The first and the last points (k, 2, 3) of ``lines`` at rest, or where their ``points`` (n, 3) are."""
+    at = lines.points if points is None else points
+    return np.stack([at[lines.offsets[:-1]], at[lines.offsets[1:] - 1]], axis=1)
+
+
+def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
+    """The ends of the ``fibres`` of a muscle by its attachments and the parts that they exempt from contact, None without any.
+
+    A fibre runs from bone to bone: of the pairs of attachments to two bones, its ends belong to that with the least sum of
+    distances, so that a short fibre beside its origin does not belong to the origin twice. Where one bone has all attachments,
+    each end belongs to the nearest.
+    """
+    if not attached:
+        return None
+    ends = ends_of(fibres)
+    nearest = [_nearest(exempt, i, ends) for i in range(len(attached))]
+    away = np.stack([one.distance for one in nearest], axis=1).reshape(len(ends), 2, -1)
+    closest = np.stack([one.closest for one in nearest], axis=1).reshape(len(ends), 2, -1, 3)
+    bones = np.array([one.bone.name for one in attached])
+    sums = away[:, 0, :, None] + away[:, 1, None, :]
+    if len(np.unique(bones)) > 1:
+        sums = np.where(bones[:, None] == bones, np.inf, sums)
+    pairs = np.argmin(sums.reshape(len(ends), -1), axis=1)
+    by = np.stack(np.divmod(pairs, len(bones)), axis=1)
+    fibre, side = np.indices(by.shape)
+    return FibreEnds(attached, by, away[fibre, side, by], closest[fibre, side, by])
+
+
+def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
+    """The ``lines``, those that end beside their attachment with the straight piece to its closest point, in steps of 2 mm or less.
+
+    Where a piece leaves the muscle its points are to be moved back into it.
+    """
+    parts = []
+    for i, (first, last) in enumerate(ends.beside):
+        line = lines.points[lines.offsets[i] : lines.offsets[i + 1]]
+        before = _steps(line[0], ends.closest[i, 0])[::-1] if first else line[:0]
+        after = _steps(line[-1], ends.closest[i, 1]) if last else line[:0]
+        parts.append(np.concatenate([before, line, after]))
+    return Polylines(np.concatenate(parts), np.cumsum([0, *map(len, parts)]))
+
+
+def _steps(start: Floats, end: Floats) -> Floats:
+    """Points (n, 3) [mm] evenly from ``start``, without it, to ``end``."""
+    return np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / REACHES)) + 1)[1:]
+
+
+def _nearest(exempt: Exemption, i: int, ends: Floats) -> Distances:
+    """The closest points of the area of attachment ``i`` to ``ends`` (k, 2, 3), end by end (2 k,)."""
+    part = exempt.part[exempt.by == i]
+    return distances(ends.reshape(-1, 3), Surface(part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3)))

@@ -1,0 +1,43 @@
+"""A calibration as lines of text: the estimates with their intervals, and what the measurements do not determine."""
+
+from fem_reference.assessment.calibration import CONFIDENCE, Calibration, Estimate
+from fem_reference.report.words import number
+
+# Scatter beyond these, in standard deviations of the data, is remarked.
+_LITTLE, _MUCH = 0.5, 2.0
+
+
+def text(found: Calibration) -> str:
+    """A calibration as lines of text."""
+    lines = [
+        f"{found.case}: {len(found.estimates)} parameters from {len(found.rows)} measurements, {found.runs} runs asked"
+    ]
+    lines += [_line(one) for one in found.estimates]
+    lines.append(
+        f"  what is left scatters by {number(found.scatter)} of the standard deviations of the data{_remark(found.scatter)}"
+    )
+    lines += [
+        f"  not determined apart: {one} and {other}, whose errors are correlated by {correlation:.3f}"
+        for one, other, correlation in found.pairs
+    ]
+    values = ", ".join(number(one) for one in found.singular)
+    return "\n".join([*lines, f"  singular values of the sensitivities: {values}"])
+
+
+def _line(one: Estimate) -> str:
+    """An estimate with its interval, or why it has none to speak of."""
+    unit = f" {one.parameter.unit}" if one.parameter.unit else ""
+    said = (
+        f"  {one.parameter.title}: {one.value:.5g}{unit}, {100 * CONFIDENCE:.0f} % from {one.low:.5g} to {one.high:.5g}"
+    )
+    if one.at:
+        end = getattr(one.parameter, one.at)
+        return f"{said}: at the {one.at} end of its range, {end:.5g}{unit}, so that neither it nor its interval counts"
+    return said if one.is_known else f"{said}: not determined by these measurements"
+
+
+def _remark(scatter: float) -> str:
+    """The meaning of a scatter that is far from 1."""
+    if scatter > _MUCH:
+        return ": the law does not follow the data"
+    return ": the data scatter less than they say" if scatter < _LITTLE else ""

@@ -1,0 +1,108 @@
+"""The page ``credibility``: by quantity, what it is verified and validated by, after NIST's fire models and ASME V&V 40."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fem_reference.assessment.credibility import Beside, Credibility
+from fem_reference.assessment.experiments import Experiment, experiments
+from fem_reference.assessment.moment_arms import ArmsBeside
+from fem_reference.io.texts import finite, plain
+from fem_reference.report.drawings import Drawing, colour_of, drawn
+from fem_reference.report.pages import Page
+
+GRADES = {
+    "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
+    "indicative": "within what single specimens, quotations or memory say",
+    "outside": "outside of an experiment by more than its uncertainty",
+    "verified only": "no experiment is laid beside it",
+    "not measured": "the data of its experiment is not here",
+}
+
+
+def page(found: Credibility) -> Page:
+    """The page of the evidence for each quantity."""
+    contents = {
+        "found": found,
+        "grades": GRADES,
+        "met": {
+            (fit.law, one.name): met(fit.values, one) for fit in found.fits for row in found.rows for one in row.beside
+        },
+        "records": _records(found),
+        "drawings": [_drawing(one) for one in found.arms],
+    }
+    return Page("credibility", "Credibility", (("", "", said(found)),), "credibility_page.html", contents, facts(found))
+
+
+def said(found: Credibility) -> str:
+    """The number of quantities by grade, and of comparisons that are met."""
+    counts = Counter(str(row.grade) for row in found.rows)
+    grades = ", ".join(f"{counts[grade]} {grade}" for grade in GRADES if counts[grade])
+    beside = [one for row in found.rows for one in row.beside]
+    return (
+        f"{len(found.rows)} quantities: {grades}; {sum(one.met for one in beside)} of {len(beside)} comparisons within"
+    )
+
+
+def met(values: Mapping[str, float], one: Beside) -> bool | None:
+    """True where the value by the name of a comparison is within its uncertainty; None where there is none."""
+    return abs(values[one.name] - one.truth) <= one.within if one.name in values else None
+
+
+def _records(found: Credibility) -> dict[str, Experiment]:
+    """The records of all experiments, those first of which a comparison bears the name."""
+    return dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {}
+
+
+def facts(found: Credibility) -> dict[str, Any]:
+    """All of it as valid JSON."""
+    rows = [
+        {
+            "quantity": row.claim.name,
+            "grade": row.grade,
+            "kinds": dict(row.kinds),
+            "orders": list(row.orders),
+            "other_codes": row.claim.other_codes,
+            "bar": row.claim.bar,
+            "band": [f"{one.value:g} {one.unit}" for one in row.band],
+            "beside": [plain(one) for one in row.beside],
+        }
+        for row in found.rows
+    ]
+    arms = [
+        {
+            **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "setting")},
+            **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter", "coarser")},
+            "poses": len(one.found.angles),
+        }
+        for one in found.arms
+    ]
+    fits = [plain(one) | {"inside": one.inside} for one in found.fits]
+    return {"rows": rows, "arms": arms, "fits": fits, "missing": dict(found.missing)}
+
+
+def _drawing(arms: ArmsBeside) -> Drawing:
+    """The range of the fibres' arms over the angle, beside the published curve or range."""
+
+    def draw(_: Figure, axes: Axes) -> None:
+        at, own, known = arms.found.angles, arms.found, arms.published
+        axes.fill_between(
+            at, own.low, own.high, color=colour_of(1), alpha=0.35, linewidth=0, label="fibres of the reference"
+        )
+        axes.plot(at, arms.middle, color=colour_of(1), label="their mean")
+        if arms.is_curve:
+            axes.plot(at, known.low, "--", color="#333333", label="published")
+        else:
+            axes.plot(at, known.low, "--", color="#333333", label="published range")
+            axes.plot(at, known.high, "--", color="#333333")
+        axes.set(xlabel="flexion of the hip, degrees", ylabel=f"moment arm of {arms.sense}, mm")
+        axes.legend(fontsize="x-small")
+
+    share = "not known" if math.isnan(arms.share) else f"{100 * arms.share:.0f} %"
+    what = "of poses inside" if arms.is_curve else "of the range covered"
+    title = f"{arms.muscle.replace('_', ' ').capitalize()} beside {arms.experiment}: {share} {what}"
+    return drawn(f"arms-{arms.case}-{arms.experiment}", title, (4.6, 3.6), draw)

@@ -1,0 +1,101 @@
+"""Numbers of a case by their keys, such as ``effect[0].mu``: read, changed and named."""
+
+import re
+from typing import Annotated, Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from fem_reference.effects import Effect, name_of
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.units import field_unit, written
+from fem_reference.scenes.case import Case
+
+
+def parts(key: str) -> list[str | int]:
+    """The parts of a ``key``, places in a list as numbers.
+
+    >>> parts("effect[0].ramp[1].amount")
+    ['effect', 0, 'ramp', 1, 'amount']
+    """
+    found = re.findall(r"[^.\[\]]+", key) or [""]
+    return [int(part) if part.isdecimal() and len(part) < 10 else part for part in found]
+
+
+def number(case: Case, key: str) -> float:
+    """The number of a ``case`` at a ``key``, in its unit inside; InputError where there is none."""
+    found = _along(case, key)[-1]
+    if isinstance(found, bool) or not isinstance(found, float | int):
+        got = "no value" if found is None else f"{type(found).__name__}"
+        raise InputError(join(case.place, key), got, "the key of a number that this case has")
+    return float(found)
+
+
+def unit(case: Case, key: str) -> str:
+    """The unit inside of the number at a ``key``; empty where it has none."""
+    return field_unit(_field(case, key))
+
+
+def read(case: Case, key: str, value: str | float) -> float:
+    """A ``value`` for the number at a ``key``, as scene files write it or in its unit inside; InputError where it is none."""
+    field = _field(case, key)
+    kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+    try:
+        return float(TypeAdapter(kind).validate_python(written(value, field_unit(field)), strict=True))
+    except ValidationError as error:
+        want = error.errors()[0]["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        raise InputError(
+            join(case.place, key), f'"{value}"' if isinstance(value, str) else repr(value), want
+        ) from error
+
+
+def changed[C: Case](case: C, values: dict[str, float]) -> C:
+    """The ``case`` with other numbers by key, in their units inside, each checked as in a scene file."""
+    for key, value in values.items():
+        found: Any = read(case, key, value)
+        for inside, part in zip(reversed(_along(case, key)[:-1]), reversed(parts(key)), strict=True):
+            if isinstance(part, int):
+                found = (*inside[:part], found, *inside[part + 1 :])
+            else:
+                found = inside.model_copy(update={part: found})
+        case = found
+    return case
+
+
+def title(case: Case, key: str) -> str:
+    """A ``key`` in words: an effect by its name, what has a name by that; ``neo_hooke mu`` for ``effect[0].mu``."""
+    words = list[str]()
+    for part, inside in zip(parts(key), _along(case, key)[1:], strict=True):
+        if isinstance(inside, Effect):
+            words[-1] = name_of(inside)
+        elif isinstance(part, int):
+            words.append(str(getattr(inside, "name", part + 1)))
+        else:
+            words.append(part)
+    return " ".join(words)
+
+
+def _field(case: Case, key: str) -> Any:
+    """The field of a record that the number at a ``key`` is in."""
+    number(case, key)
+    owner, name = _along(case, key)[-2], parts(key)[-1]
+    if not isinstance(owner, Record):
+        raise InputError(join(case.place, key), "a number of a list", "the key of a number with a name")
+    return type(owner).model_fields[str(name)]
+
+
+def _along(case: Case, key: str) -> list[Any]:
+    """The ``case`` and all that the parts of a ``key`` lead to, one inside the other; InputError where they lead nowhere."""
+    found: list[Any] = [case]
+    for part in parts(key):
+        inside = found[-1]
+        known = isinstance(inside, tuple) and part < len(inside) if isinstance(part, int) else part in _names(inside)
+        if not known:
+            raise InputError(join(case.place, key), "nothing", "the key of a number that this case has")
+        found.append(inside[part] if isinstance(part, int) else getattr(inside, part))
+    return found
+
+
+def _names(inside: Any) -> set[str]:
+    """The keys of a record."""
+    return set(type(inside).model_fields) if isinstance(inside, Record) else set()

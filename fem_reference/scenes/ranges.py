@@ -1,0 +1,58 @@
+"""The parameters of a case that nobody knows exactly: the ranges that its effects state, and those that the case states itself."""
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.limits import Range
+from fem_reference.foundations.records import join
+from fem_reference.scenes import numbers
+from fem_reference.scenes.muscle import MuscleCase
+
+
+def ranges(case: MuscleCase) -> dict[str, Range]:
+    """The ranges by key: the published ones of the parameters of its effects, and in their place or beside them its own."""
+    stated = {
+        f"effect[{i}].{name}": one for i, effect in enumerate(case.effects) for name, one in effect.published.items()
+    }
+    return stated | {entry.key: Range(**entry.model_dump(exclude={"key"})) for entry in case.uncertain}
+
+
+def left_out(case: MuscleCase) -> list[str]:
+    """The keys of the numbers of its effects that have no range."""
+    known = ranges(case)
+    found = [
+        f"effect[{i}].{name}"
+        for i, effect in enumerate(case.effects)
+        for name, value, _ in effect.parameters
+        if isinstance(value, float)
+    ]
+    return [key for key in found if key not in known]
+
+
+def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
+    """The ends of a range of the number at a ``key``, in its unit inside; InputError at ``place`` where they are none."""
+    found = []
+    for name in ("low", "high"):
+        try:
+            found.append(numbers.read(case, key, getattr(one, name)))
+        except InputError as error:
+            raise InputError(f"{place}.{name}", error.got, error.want) from error
+    low, high = found
+    if not low < high:
+        raise InputError(f"{place}.high", f'"{one.high}"', f'more than low, "{one.low}"')
+    if one.spread == "log-uniform" and not low > 0:
+        raise InputError(f"{place}.low", f'"{one.low}"', "more than zero: its logarithm is spread")
+    return low, high
+
+
+def check(case: MuscleCase) -> None:
+    """InputError where a range that a ``case`` states is of no number of it, or has no ends."""
+    keys = list[str]()
+    for i, entry in enumerate(case.uncertain):
+        place = join(case.place, f"uncertain[{i}]")
+        if entry.key in keys:
+            raise InputError(f"{place}.key", f'"{entry.key}" a second time', "every key once")
+        keys.append(entry.key)
+        try:
+            numbers.number(case, entry.key)
+        except InputError as error:
+            raise InputError(f"{place}.key", f'"{entry.key}"', error.want) from error
+        ends(case, entry.key, entry, place)

@@ -1,0 +1,126 @@
+"""Hip moment arms of the reference's fibres beside published ones, on the report's anatomy, with coarse runs."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.assessment import experiments
+from fem_reference.assessment.moment_arms import ArmsBeside, Range, fitted_arms, poses, range_of
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.metrics import context_of
+from fem_reference.metrics.fibre_length import both_lengths
+from fem_reference.runs.store import Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies.campaign import each
+from fem_reference.studies.execution import Bench
+
+LARGER = 1.25  # tetrahedra of a second run, that says how far the arms depend on their size
+NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
+
+
+@dataclass(frozen=True)
+class ArmStudy:
+    """A ``case``, the size of its tetrahedra [mm], the last frame up to which it turns one way, its ``muscle`` in published files,
+    the ``sense`` of positive arms and the ``experiments`` beside it.
+    """
+
+    case: str
+    tet_size: float
+    last: int
+    muscle: str
+    sense: str
+    experiments: tuple[str, ...]
+
+
+STUDIES = (
+    ArmStudy("gluteus_maximus", 11.2, 100, "gluteus_maximus", "extension", (NEMETH, BLEMKER)),
+    ArmStudy("iliacus_anatomical", 7.0, 100, "iliacus", "flexion", (BLEMKER,)),
+)
+
+
+def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
+    """The arms of each wanted muscle beside each experiment, and by case the reason why one is missing."""
+    found, missing = each({one.case: one for one in STUDIES}, lambda one: list(of_case(one, store)))
+    return tuple(one for several in found.values() for one in several), missing
+
+
+def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
+    """The arms of a case beside each of its experiments; InputError where a run did not converge."""
+    scene = casefile.read_muscle(wanted.case)
+    angles, arms = _arms(wanted, wanted.tet_size, store)
+    coarser = _arms(wanted, LARGER * wanted.tet_size, store)[1].mean(axis=1) - arms.mean(axis=1)
+    setting = f"{wanted.tet_size:g} mm tetrahedra, not refined"
+    for name in wanted.experiments:
+        yield ArmsBeside(
+            *(wanted.case, wanted.muscle, wanted.sense, name, setting),
+            found=range_of(angles, arms),
+            middle=arms.mean(axis=1),
+            published=published(scene, name, wanted.muscle).at(angles),
+            coarser=float(np.abs(coarser).max()),
+        )
+
+
+def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Floats]:
+    """Angles (a,) [deg] and arms (a, k) [mm], positive in the sense that is wanted, on tetrahedra of ``tet_size`` [mm]."""
+    bench = Bench(coarse(casefile.read_muscle(wanted.case), tet_size, wanted.last), store)
+    run = bench.reference()
+    if run.outcome.status != "converged":
+        raise InputError(wanted.case, run.outcome.message, "a reference that converged")
+    angles, arms = flexion_arms(run, bench)
+    return angles, arms if wanted.sense == "flexion" else -arms
+
+
+def coarse(scene: MuscleCase, tet_size: float, last: int) -> MuscleCase:
+    """The case on tetrahedra of ``tet_size`` [mm] that are not refined, up to the frame ``last``, with nobody compared."""
+    muscle = scene.muscle.model_copy(update={"tet_size": tet_size, "refinements": 0})
+    frames = scene.frames.model_copy(update={"last": last})
+    changes = {"muscle": muscle, "frames": frames, "expect": (), "candidate": (), "negative_control": None, "quick": {}}
+    return scene.model_copy(update=changes)
+
+
+def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
+    """Angles of flexion (a,) [deg], against the joint's own about the axis to the left, and arms of flexion (a, k) [mm] there."""
+    context = context_of(bench.setup(), run)
+    if len(context.joints) != 1:
+        raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one")
+    flexion = -np.degrees(context.joints[0].angles(run.numbers))
+    at = poses(flexion)
+    return at, fitted_arms(flexion, both_lengths(run, run, context)[0], at)
+
+
+def published(scene: MuscleCase, experiment: str, muscle: str) -> Range:
+    """The published curve or range of a ``muscle``, from its file in the data folder."""
+    record = experiments.experiments()[experiment]
+    path = scene.file(f"data:{record.file}", experiment)
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file, strict=True))
+    try:
+        if not rows:
+            raise ValueError("no row")
+        return _curve(rows) if experiment == NEMETH else _envelope(rows, muscle)
+    except (KeyError, ValueError) as error:
+        raise InputError(str(path), repr(error), "angles and moment arms, as numbers below their heads") from None
+
+
+def _curve(rows: list[dict[str, str]]) -> Range:
+    angles, arms = (
+        np.array([float(row[key]) for row in rows]) for key in ("hip_flexion_deg", "extension_moment_arm_mm")
+    )
+    return Range(angles, arms, arms)
+
+
+def _envelope(rows: list[dict[str, str]], muscle: str) -> Range:
+    """The range in mm, of a file in cm, at the angles of both sides together."""
+    sides = {}
+    for bound in ("lower", "upper"):
+        side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]
+        sides[bound] = np.array(sorted((float(row["angle_deg"]), 10 * float(row["moment_arm_cm"])) for row in side)).T
+    (low_at, low), (high_at, high) = sides["lower"], sides["upper"]
+    angles = np.unique(np.concatenate([low_at, high_at]))
+    angles = angles[(angles >= max(low_at[0], high_at[0])) & (angles <= min(low_at[-1], high_at[-1]))]
+    return Range(angles, np.interp(angles, low_at, low), np.interp(angles, high_at, high))

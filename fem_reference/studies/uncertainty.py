@@ -1,0 +1,160 @@
+"""The band that unknown parameters of a case allow: runs of its reference on a Latin hypercube, and its candidates beside it."""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.assessment import bands
+from fem_reference.assessment.bands import Design, sampled
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.uncertainty import Band, Failure, Parameter, Uncertainty, place
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import join
+from fem_reference.metrics import MeasurementContext, change, described, find
+from fem_reference.problems import of_case
+from fem_reference.runs.key import made_with
+from fem_reference.runs.store import Run, complete
+from fem_reference.scenes import numbers, ranges
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers import fenicsx
+from fem_reference.studies import judging, refinement
+from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
+from fem_reference.studies.variations import Trial
+
+log = logging.getLogger(__name__)
+
+# The quantities that have a band beside the surface's and forces, of those that a case has.
+QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")
+SURFACE = ("surface_deviation", "rms")
+FORCE = "force on "
+
+
+def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
+    """The bands of a case from so many ``runs`` of its reference; InputError where no parameter has a range, or the case itself has
+    no solution.
+    """
+    case = of_case.chosen(case).model_copy(update={"choice": "listed", "decisions": ()})  # the same effects in all runs
+    parameters = parameters_of(case)
+    points = sampled(len(parameters), runs, seed)
+    trials = [_trial(case, parameters, point) for point in points]
+    with fenicsx.shared():
+        comparison, lost = _nominal(case, store, workers)
+        made = carry_out(trials, store, workers)
+    answered = [one.reached is not None for one in made]
+    design = Design(parameters, points[answered], runs)
+    found = tuple(of_runs(comparison, design, [run for one in made if (run := one.reached) is not None]))
+    known = [one.run.outcome.cost.get("seconds_processor", np.nan) for one in made if one.run]
+    return Uncertainty(
+        case=case.name,
+        title=case.title,
+        size=case.muscle.tet_size / 2**case.muscle.refinements,
+        parameters=parameters,
+        fixed=tuple(numbers.title(case, key) for key in ranges.left_out(case)),
+        runs=runs,
+        seed=seed,
+        failures=tuple(_failure(one, parameters) for one in made if one.reached is None),
+        bands=found,
+        placed=tuple(place(run.name, band, values) for run, band, values in _beside(comparison, found)),
+        lost=lost,
+        seconds=float(np.mean(known)) if known else np.nan,
+        origin=made_with(str(workers)),
+    )
+
+
+def parameters_of(case: MuscleCase) -> tuple[Parameter, ...]:
+    """The parameters of a case that have a range; InputError where there are none."""
+    found = []
+    for key, one in ranges.ranges(case).items():
+        low, high = ranges.ends(case, key, one, join(case.place, key))
+        named = numbers.title(case, key), numbers.unit(case, key), numbers.number(case, key)
+        found.append(Parameter(key, *named, low, high, one.spread, one.source))
+    if not found:
+        want = 'a range of some number: [[uncertain]] with key, low, high and source, such as key = "effect[0].mu"'
+        raise InputError(join(case.place, "uncertain"), "no parameter with a range", want)
+    return tuple(found)
+
+
+def _trial(case: MuscleCase, parameters: Sequence[Parameter], point: Floats) -> Trial:
+    """The run of the reference at a ``point`` (d,) of the design."""
+    values = {one.key: one.value(float(at)) for one, at in zip(parameters, point, strict=True)}
+    said = ", ".join(f"{one.title} {values[one.key]:.3g} {one.unit}".rstrip() for one in parameters)
+    return Trial(numbers.changed(case, values), case.reference, "reference", "design", said, values)
+
+
+def _nominal(case: MuscleCase, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
+    """The case itself with its error bars beside its candidates, and by candidate why it did not reach all frames."""
+    bench = shared_bench(case, store)
+    reference = bench.reference()
+    if reference.outcome.status != "converged" or reference.fibres is None:
+        got = f"a reference that {reference.outcome.status}: {reference.outcome.message}"
+        raise InputError(case.place, got, "one that reaches all frames: the band lies around it")
+    bars = refinement.bars(bench, reference, model=False)
+    made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)
+    lost = {one.trial.name: ": ".join(one.ended) for one in made if one.reached is None}
+    return judging.compare(bench, reference, [one.run for one in made if one.run], bars), lost
+
+
+def _failure(one: Made, parameters: Sequence[Parameter]) -> Failure:
+    return Failure({known.key: float(one.trial.changed[known.key]) for known in parameters}, *one.ended)
+
+
+def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iterator[Band]:
+    """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have answers."""
+    whole = [complete(run, comparison.reference.numbers) for run in runs]
+    context = comparison.context
+    assert isinstance(context, MeasurementContext)  # of a muscle
+    yield _surface(comparison, context, design, whole)
+    measured = [change(run, context, {name.split(".")[0] for name in QUANTITIES}) for run in whole]
+    for name in QUANTITIES:
+        metric, statistic = name.split(".")
+        nominal = find(comparison.changes["reference"], metric, statistic)
+        if nominal is not None and np.isfinite(nominal.values).any():
+            stated = described()[metric, statistic]
+            empty = _empty(comparison, name, stated.curve or stated.label, stated.unit, nominal.values)
+            found = [one.values for each in measured if (one := find(each, metric, statistic)) is not None]
+            yield bands.of_values(replace(empty, bar=nominal.error_bars), design, _rows(found, nominal.values))
+    for bone in context.bones:
+        if bone.motion is not None and f"force_on_{bone.name}_x" in comparison.reference.scalars:
+            own, *forces = (np.linalg.norm(run.force(bone.name), axis=1) for run in (comparison.reference, *whole))
+            empty = _empty(comparison, f"{FORCE}{bone.name}", f"Force of the muscle on {bone.name}", "N", own)
+            yield bands.of_values(empty, design, _rows(forces, own))
+
+
+def _rows(found: Sequence[Floats], like: Floats) -> Floats:
+    """The values (n, f) of runs, of which there may be none."""
+    return np.array(found).reshape(len(found), len(like))
+
+
+def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
+    """The band of the distance of the surface from the case's own, root mean square over its area."""
+    reference, bars = comparison.reference, comparison.error_bars
+    title, frames = "Distance of the surface from that of the case, rms", len(reference.numbers)
+    empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))
+    bar = None if bars is None else bars.find("deviation", *SURFACE)
+    weights = np.sqrt(context.areas / context.areas.sum())[:, None]
+    products = np.zeros((frames, len(runs), len(runs)))
+    for i in range(frames if runs else 0):
+        moved = np.array([((run.positions[i] - reference.positions[i]) * weights).ravel() for run in runs])
+        products[i] = moved @ moved.T
+    return bands.of_field(replace(empty, bar=None if bar is None else bar.values, distance=True), design, products)
+
+
+def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal: Floats) -> Band:
+    """A band of nothing yet, around the answer of the case."""
+    unknown = np.full(len(nominal), np.nan)
+    return Band(quantity, title, unit, comparison.reference.numbers, nominal, unknown, unknown, unknown)
+
+
+def _beside(comparison: Comparison, found: Sequence[Band]) -> Iterator[tuple[Run, Band, Floats]]:
+    """Each candidate that has a value of a quantity, with the band, where there is one, and its values (f,)."""
+    for run in comparison.candidates:
+        for band in found:
+            metric, _, statistic = band.quantity.partition(".")
+            measures = comparison.deviations[run.name] if band.distance else comparison.changes[run.name]
+            measure = find(measures, metric, statistic)
+            if measure is not None and not band.refused:
+                yield run, band, measure.values

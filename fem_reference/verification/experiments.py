@@ -1,0 +1,148 @@
+"""Measured muscles beside the shipped material, which was chosen from other sources and is never fitted to these.
+
+An entry states whether the value is within the uncertainty of the experiment; outside is a finding, not a failure. Its value is
+pinned, so that a change of a law or of the material does not pass unseen.
+"""
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import cast
+
+from fem_reference.assessment import muscle_cubes
+from fem_reference.assessment.catalogue import Entry, Finding, Lab, Result, result
+from fem_reference.assessment.experiments import find, ratio
+from fem_reference.assessment.muscle_cubes import QUANTITIES, SHIPPED, Material, Quantity, with_collagen
+from fem_reference.effects import make
+
+EXPERIMENT = partial(Entry, group="experiments", kind="experiment")
+STIFFER = (make("neo_hooke", mu=0.011), *SHIPPED[1:])
+ISOTROPIC = SHIPPED[:2]
+COLLAGEN = with_collagen(0.3, 0.2, 1.5)
+# By name: the value of the shipped material. Numbers of our own: they guard against change and validate nothing.
+PINNED = {
+    "cube_poisson_along": 0.4995238,
+    "cube_poisson_fibre": 0.1466180,
+    "cube_poisson_across": 0.8521583,
+    "cube_stiffness_ratio": 0.7783656,
+    "cube_softest_midway": 0.0,
+    "cube_stiffest_across": 1.0,
+    "cube_confinement": 5.6871806,
+    "strip_stiffness_ratio": 6.1090860,
+    "strip_poisson_fibre": 0.4994741,
+    "strip_poisson_across": 0.4994741,
+}
+# Vastus lateralis: Ward et al. 2009, doi 10.1007/s11999-008-0594-8, and arms of the knee's extensors, all from memory.
+FIBRE, OPTIMAL, PENNATION, ARM = 99.4, 2.7, 18.4, 40.0  # mm at a sarcomere length of um, degrees, mm
+_ANGLES = math.radians(110 - 50)
+
+
+def measured(_: Lab, quantity: Quantity, material: Material) -> Finding:
+    """A quantity of a material, with the reason why the shipped one cannot reach it."""
+    return Finding(quantity.of(material), note=f"Known limit: {quantity.limit}" if quantity.limit else "")
+
+
+def vastus_stretch(_: Lab, arm: float) -> Finding:
+    """The stretch of fibres of a planar muscle of constant thickness that lengthens by an ``arm`` [mm] times 60 degrees."""
+    length = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL
+    along, across = math.cos(math.radians(PENNATION)), math.sin(math.radians(PENNATION))
+    found = [math.hypot(along + one * _ANGLES / length, across) for one in (arm - 5, arm, arm + 5)]
+    note = (
+        f"Moment arms 5 mm less and more give {found[0]:.2f} and {found[2]:.2f}. Tendon and aponeurosis are rigid here; in a body "
+        "they take a part. Architecture and moment arm are from memory."
+    )
+    return Finding(found[1], note=note)
+
+
+def _control(name: str) -> tuple[str, Material]:
+    """The negative control of a quantity: in words, and the material."""
+    if name == "cube_softest_midway":
+        return "Collagen across the fibres.", COLLAGEN
+    return ("No fibres.", ISOTROPIC) if name == "cube_stiffest_across" else ("Shear modulus 10 % too high.", STIFFER)
+
+
+def _entry(quantity: Quantity) -> Entry:
+    words, wrong = _control(quantity.name)
+    first = quantity.facts[0]
+    return EXPERIMENT(
+        name=quantity.name,
+        title=quantity.title,
+        unit=quantity.unit,
+        measure=measured,
+        given={"quantity": quantity, "material": SHIPPED},
+        negative_control=words,
+        wrong={"material": wrong},
+        truth=quantity.truth,
+        within=quantity.within,
+        because=quantity.because,
+        source=f"{quantity.experiment}, read in: {first.read_in}; doi {first.doi}"
+        + ("" if first.doi_confirmed == "yes" else " (from memory)"),
+        pinned=PINNED[quantity.name],
+        facts=quantity.facts,
+    )
+
+
+_SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
+_STRETCH, _SD = ratio(*_SARCOMERES)
+_ORDER = "An order: 1 where both are met by 1 % and more, 0 where not."
+_LIMIT = "A law of fibres that pull in tension only meets neither."
+ORDERS = Quantity(
+    name="cube_both_orders",
+    title="Stiffer along the fibres in compression and across them in tension",
+    experiment="takaza_2013",
+    of=muscle_cubes.both_orders,
+    facts=(),
+    truth=1.0,
+    within=0.5,
+    because=_ORDER,
+    limit=_LIMIT,
+)
+
+
+def _orders(quantity: Quantity, pinned: float, materials: tuple[Material, Material], negative_control: str) -> Entry:
+    """Both orders of a material; the second of the ``materials`` is that of the negative control."""
+    return EXPERIMENT(
+        name=quantity.name,
+        title=quantity.title,
+        unit=quantity.unit,
+        measure=measured,
+        given={"quantity": quantity, "material": materials[0]},
+        negative_control=negative_control,
+        wrong={"material": materials[1]},
+        truth=quantity.truth,
+        within=quantity.within,
+        because=quantity.because,
+        source="van_loocke_2006, read in: quotation; takaza_2013, from memory",
+        pinned=pinned,
+    )
+
+
+WITH_COLLAGEN = replace(
+    ORDERS, name="cube_both_orders_collagen", title=f"{ORDERS.title}: with collagen across the fibres", limit=""
+)
+
+ENTRIES = (
+    *map(_entry, QUANTITIES),
+    _orders(ORDERS, 0.0, (SHIPPED, COLLAGEN), "Collagen across the fibres."),
+    _orders(WITH_COLLAGEN, 1.0, (COLLAGEN, SHIPPED), "No collagen."),
+    EXPERIMENT(
+        name="vastus_stretch",
+        title="Idealised vastus lateralis, knee flexed from 50 to 110 degrees: stretch of its fibres",
+        unit="1",
+        measure=vastus_stretch,
+        given={"arm": ARM},
+        negative_control="Moment arm 10 % too great.",
+        wrong={"arm": 1.1 * ARM},
+        truth=_STRETCH,
+        within=_SD,
+        because="The standard deviation of the ratio of two sarcomere lengths of six people, as if independent.",
+        source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture and arm of the model from memory",
+        pinned=1.3859333,
+        facts=_SARCOMERES,
+    ),
+)
+
+
+def results() -> dict[str, Result]:
+    """All of them by name; none needs a solver."""
+    return {one.name: result(one, one.find(cast("Lab", None)), 0.0, with_negative_control=False) for one in ENTRIES}

@@ -1,0 +1,39 @@
+"""The page of credibility and its numbers."""
+
+import html
+import json
+
+from fem_reference import report
+from fem_reference.assessment.experiments import experiments
+from fem_reference.report import credibility_page
+from tests.assessment.test_credibility import found
+
+
+def test_the_page_and_its_numbers(tmp_path) -> None:
+    path = report.write(credibility_page.page(found()), tmp_path / "new", "credibility")
+    text, numbers = html.unescape(path.read_text()), json.loads((path.parent / "credibility.json").read_text())
+    assert [one["grade"] for one in numbers["rows"]] == ["validated", "indicative", "outside", "verified only"]
+    assert numbers["missing"] == {"lost": "why it was"}
+    assert "why it was" in text
+    assert (len(numbers["arms"]), text.count("<svg")) == (2, 2)
+    assert numbers["arms"][0]["share"] == 1
+    assert numbers["fits"][0]["inside"] is False
+    for grade in ("validated", "indicative", "outside", "verified only"):
+        assert f'">{grade}</span>' in text
+    for name, record in experiments().items():
+        assert name in text
+        assert record.title in text
+    assert "(published 0.100 to 0.200, outside)" in text
+    assert ">yes</td>" in text, "an order is met or not, and no number"
+
+
+def test_what_it_says_in_a_line() -> None:
+    said = credibility_page.said(found())
+    assert said == "4 quantities: 1 validated, 1 indicative, 1 outside, 1 verified only; 5 of 6 comparisons within"
+
+
+def test_a_fit_is_met_by_the_same_uncertainty_and_unknown_without_a_value() -> None:
+    (fit,), one = found().fits, found().rows[0].beside[0]
+    assert credibility_page.met(fit.values, one) is True
+    assert credibility_page.met({"cube": 1.2}, one) is False
+    assert credibility_page.met({}, one) is None

@@ -1,0 +1,61 @@
+"""The page of unknown parameters: bands, sensitivities and candidates, and what is refused or lost said."""
+
+from dataclasses import replace
+
+from fem_reference.assessment.uncertainty import Failure
+from fem_reference.report import uncertainty_page
+from tests.assessment.test_uncertainty import band, study
+
+SURFACE = replace(band(distance=True, quantity="surface_deviation.rms"), title="Distance of the surface")
+LOST = Failure({"effect[0].mu": 0.0123, "effect[1].c1": 0.003}, "diverged", "frame 40: <b>lost</b>")
+
+
+def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> None:
+    first, inside, undecided, outside = uncertainty_page.sentences(study(SURFACE, band()))
+    assert first == (
+        "In 95 of 100 cases with other parameters in their ranges the surface is within 2 mm of this case's, rms, where the "
+        "reference itself is known to 0.100 mm. Most of it is by mooney_rivlin c1 (70 % of the variance)."
+    )
+    assert inside == "Candidates whose surface errs less than what nobody knows: fast."
+    assert undecided.endswith("with the error bar of the reference: near.")
+    assert outside == "Candidates whose surface errs more than what nobody knows: far."
+
+
+def test_the_page_shows_ranges_with_source_and_what_was_not_varied() -> None:
+    text = uncertainty_page.page(study(SURFACE, band())).html()
+    for part in (
+        "Someone 2006",
+        "log-uniform",
+        "outside the range",
+        "Not varied, as no range is stated: incompressible bulk",
+    ):
+        assert part in text
+    assert "3 of 3 frames inside" in text
+    assert "up to 2.00 mm beyond" in text
+    assert "diverged: frame 3" in text
+
+
+def test_runs_without_an_answer_are_counted_and_named() -> None:
+    text = uncertainty_page.page(study(SURFACE, failures=(LOST,))).html()
+    assert "1 of 64 runs have no answer" in text
+    assert "0.0123" in text
+    assert "frame 40: &lt;b&gt;lost" in text
+    assert "1 without an answer" in uncertainty_page.text(study(SURFACE, failures=(LOST,)))
+    assert "frame 40" in uncertainty_page.text(study(SURFACE, failures=(LOST,)))
+
+
+def test_a_refused_band_is_said_and_not_drawn() -> None:
+    refused = replace(SURFACE, refused="12 of 64 runs have no answer")
+    whole = study(refused)
+    page = uncertainty_page.page(whole)
+    assert "no band: 12 of 64 runs have no answer" in page.html()
+    assert "<svg" not in page.html()
+    assert uncertainty_page.sentences(whole) == ["No band: 12 of 64 runs have no answer."]
+    assert "no band: 12 of 64" in uncertainty_page.text(whole)
+
+
+def test_without_sensitivities_the_reason_stands_in_their_place() -> None:
+    bad = replace(SURFACE, first={}, total={}, unreliable="the surrogate misses 40 % of the variance", by="runs")
+    assert "The surrogate misses 40 % of the variance." in uncertainty_page.page(study(bad)).html()
+    assert "no sensitivities: the surrogate misses" in uncertainty_page.text(study(bad))
+    assert "Most of it" not in uncertainty_page.sentences(study(bad))[0]

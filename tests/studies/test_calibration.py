@@ -1,0 +1,97 @@
+"""Calibration end to end: the moduli of a bar from its own forces, by runs of the reference."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.scenes import numbers
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies import calibration
+from fem_reference.studies.calibration import calibrate, chosen, unit_of
+from fem_reference.studies.campaign import Workers, shared_bench
+from tests.studies.test_uncertainty import PARALLEL, pulled
+
+MU, C1 = "effect[0].mu", "effect[1].c1"
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> MuscleCase:
+    return pulled(tmp_path, {"uncertain": PARALLEL, "frames.every": 5})
+
+
+def data(folder: Path, *rows: str) -> Path:
+    (folder / "data.csv").write_text("\n".join(["frame,quantity,value,unit,sd", *rows]) + "\n")
+    return folder / "data.csv"
+
+
+@pytest.mark.slow
+def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path: Path) -> None:
+    """Forces of a bar of 11 kPa with 1 % of noise: five rows about the same slope know it to 1 % / sqrt(5) and a t factor of 2.8.
+    Of two matrices in parallel only the sum acts, mu + 2 c1.
+    """
+    truth = shared_bench(numbers.changed(case, {MU: 0.011}), tmp_path / "runs").reference()
+    noise = 1 + 0.01 * np.random.default_rng(4).standard_normal(5)
+    forces = np.linalg.norm(truth.force("lid"), axis=1)
+    frames, places = (5, 10, 15, 20, 20), (1, 2, 3, 4, 4)
+    rows = [
+        f"{frame},force.lid{axis},{1000 * forces[i] * one:.6g},mN,{10 * forces[i]:.4g}"
+        for frame, i, one, axis in zip(frames, places, noise, ("", "", "", "", ".z"), strict=True)
+    ]
+    if truth.force("lid")[4, 2] < 0:
+        rows[-1] = rows[-1].replace(".z,", ".z,-")
+    path = data(tmp_path, *rows)
+    found = calibrate(case, path, [MU], tmp_path / "runs", Workers())
+    (mu,) = found.estimates
+    assert mu.low < 0.011 < mu.high
+    assert mu.high - mu.low < 0.1 * mu.value
+    assert mu.is_known
+    assert found.runs < 16
+    both = calibrate(case, path, [MU, C1], tmp_path / "runs", Workers())
+    ((one, other, correlation),) = both.pairs
+    assert (one, other) == ("neo_hooke mu", "mooney_rivlin c1")
+    assert correlation < -0.99
+    assert not any(one.is_known for one in both.estimates)
+    mu, c1 = both.estimates
+    assert mu.value + 2 * c1.value == pytest.approx(found.estimates[0].value + 2 * 0.003, rel=1e-3)
+
+
+def test_quantities_have_the_units_of_the_case(case: MuscleCase) -> None:
+    for quantity, unit in (
+        ("force.lid", "N"),
+        ("force.lid.z", "N"),
+        ("position.3.x", "mm"),
+        ("volume.deviation", "%"),
+        ("joint_moment.moment", "N mm"),
+    ):
+        assert unit_of(case, quantity, "here") == unit
+
+
+@pytest.mark.parametrize(
+    ("quantity", "want"),
+    [
+        ("force.femur", "force.BONE or force.BONE.x, of one of floor, lid"),
+        ("force", "force.BONE"),
+        ("position.3", "METRIC.STATISTIC, force.BONE"),
+        ("position.x.x", "METRIC.STATISTIC"),
+        ("length", "METRIC.STATISTIC"),
+        ("l2_error.relative", "METRIC.STATISTIC"),
+    ],
+)
+def test_a_quantity_that_a_muscle_has_not_is_named(case: MuscleCase, quantity: str, want: str) -> None:
+    with pytest.raises(InputError, match=f'here: got "{quantity}", want {want}'):
+        unit_of(case, quantity, "here")
+
+
+def test_only_a_number_with_a_range_is_fitted(case: MuscleCase, tmp_path: Path) -> None:
+    assert [one.key for one in chosen(case, [C1, MU, C1])] == [C1, MU]
+    with pytest.raises(
+        InputError, match=r'--fit: got "effect\[2\]\.bulk", which has no range, want a key with a range'
+    ):
+        chosen(case, ["effect[2].bulk"])
+    with pytest.raises(InputError, match=r"--fit: got nothing, want one of effect\[0\]\.mu"):
+        chosen(case, [])
+    with pytest.raises(InputError, match=r"row 2: frame: got 7, want one of the case: 0 to 20, every 5"):
+        calibrate(case, data(tmp_path, "7,force.lid,1,N,1"), [MU], tmp_path / "runs", Workers())
+    assert calibration.calibrate is calibrate
