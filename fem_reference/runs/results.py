@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import skfem
 from numpy.typing import ArrayLike
 from scipy.special import roots_jacobi
 
@@ -256,12 +255,19 @@ def von_mises(stress: Floats) -> Floats:
 
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
-    """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates (n, 4), and their gradients (n, count, 3)
-    [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the order of
-    ``body.reference_nodes``.
+    """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates L (n, 4), and their gradients
+    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the
+    order of ``body.reference_nodes``.
+
+    Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite
+    Element Method, vol. 1, 8.12).
     """
-    element, degree = (skfem.ElementTetP1(), 1) if count == 4 else (skfem.ElementTetP2(), 2)
-    nodes = reference_nodes("tetrahedron", degree)
-    order = (nodes[:, None] == element.doflocs).all(axis=2).argmax(axis=1)  # the numbers that scikit-fem gives them
-    values, slopes = zip(*(element.lbasis(barycentric[:, 1:].T, i) for i in order), strict=True)
-    return np.stack(values, axis=1), np.einsum("arn,nrk->nak", np.array(slopes), gradients[:, 1:])
+    if count == 4:
+        return barycentric, gradients
+    nodes = reference_nodes("tetrahedron", 2)
+    near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
+    i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)  # the corners around each node; at a corner, it twice
+    at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
+    one, other = barycentric[:, i], barycentric[:, j]
+    slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])
+    return scale * one * other - at_corner * one, slopes - at_corner[:, None] * gradients[:, i]

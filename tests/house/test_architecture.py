@@ -20,7 +20,7 @@ DOORS = {
     "gmsh": ["geometry/tetrahedra.py"],
     "pytetwild": ["geometry/tetrahedra.py"],
     "igl": ["geometry/"],
-    "skfem": ["geometry/fibres.py", "geometry/quadratic.py", "runs/results.py", "solvers/scikit_fem/"],
+    "skfem": ["geometry/fibres.py", "geometry/quadratic.py", "solvers/scikit_fem/"],
     "numba": [
         f"solvers/{name}_kernels.py" for name in ("compiled", "pbd", "program", "collision", "xpbd", "arap", "spring")
     ],
