@@ -12,6 +12,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
+from fem_reference.effects import in_situ
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances
@@ -150,12 +151,14 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact attachments: vertices at the pose of their bone, up to strain times their distance from the attached facets. Springs:
-    their mean extension, which is the force over stiffness and area.
+    their mean extension, which is the force over stiffness and area; in situ since rest, where they have a force already.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
     weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
+    if forces is not None and in_situ.among(problem.effects) is not None:
+        forces = forces + forces[0]
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:

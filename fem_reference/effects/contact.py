@@ -15,13 +15,16 @@ class Contact(Interaction):
     """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
-    distance below which a bone is felt. ``bones``: their names, by default all.
+    distance below which a bone is felt. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
+    distance within which a bone may press at rest, through what lies between and is in no mesh, as a capsule or a bursa; by
+    default it does where the muscle touches it.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}
     stiffness: AreaStiffness
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
+    support: PositiveLength | None = None
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The possible penetration of the surface into bones, and the pressure there."""

@@ -11,14 +11,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.effects import Effect, Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
-from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
+from fem_reference.solvers.fenicsx import compiling, contact_points, forms, in_situ, meshes
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
@@ -32,7 +31,7 @@ from fem_reference.solvers.fenicsx.path import Known, KnownState, Path
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.solvers.fenicsx.stability import Stability, has_energy
+from fem_reference.solvers.fenicsx.stability import Stability, has_energy, is_changed_from_outside
 from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
 
@@ -43,7 +42,7 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
-        self.conserves = not any(map(_is_changed_from_outside, self.effects))
+        self.conserves = not any(map(is_changed_from_outside, self.effects))
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[
@@ -69,14 +68,17 @@ class AssembledBody:
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
         self.system.balance_units()
+        in_situ.balance(form, self.system, self.linear, settings.residual)
         self.path = Path(self.system, self.determinants)
+        if form.rest is not None:
+            self.path.settle(self.energy(), connected=False)
         inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, self
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
         self.at = body.frames[0]  # the frame of the last good state
-        self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock)
+        self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock, form.rest)
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         """The condition of ``entry`` on this rank's unknowns."""
@@ -282,11 +284,6 @@ class AssembledBody:
         for indices, moved in self.comm.allgather((mine, carried.positions(self.unknowns.x.array))):
             result[indices] = moved
         return result
-
-
-def _is_changed_from_outside(effect: Effect) -> bool:
-    """True for an energy that changes without deformation of the body."""
-    return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
 
 
 def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spent: Spent) -> LinearSolver:

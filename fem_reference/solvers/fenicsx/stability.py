@@ -3,7 +3,7 @@
 import numpy as np
 from dolfinx import fem
 
-from fem_reference.effects import Load
+from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.system import System
@@ -12,6 +12,11 @@ from fem_reference.solvers.fenicsx.system import System
 def has_energy(body: Body) -> bool:
     """True where all effects on ``body`` have an energy, so that its tangent is symmetric; loads may have none."""
     return not any(isinstance(effect, Load) for effect in body.effects)
+
+
+def is_changed_from_outside(effect: Effect) -> bool:
+    """True for an energy that changes without deformation of the body."""
+    return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
 
 
 class Stability:
