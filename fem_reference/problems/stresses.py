@@ -5,7 +5,6 @@ those that effects which a case left out would add.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,7 @@ _MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
 
 
-def first_piola(acting: Acting, state: State, count: int, at_rest: Any = 0.0) -> Floats:
+def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
     """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of what is ``acting``, (effect, amount) each, at a
     ``state`` whose F are the jets, and of a stress ``at_rest``.
     """
