@@ -30,12 +30,10 @@ class Contact(Interaction):
         """The possible penetration of the surface into bones, and the pressure there."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
-        depth = math.hypot(*(one.depth for one in near.values()))
-        reached = "; ".join(
-            f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing
-        )
+        depth, felt = math.hypot(*(one.depth for one in near.values())), self.smoothing + (self.support or 0.0)
+        reached = "; ".join(f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < felt)
         rule = f"guaranteed clearance to bones [mm] ({reached or 'no bone is reached'})"
-        return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
+        return Indicator(rule, gap, depth, self.stiffness * max(depth, felt - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
         """True where the bone of this name is in contact."""

@@ -12,7 +12,7 @@ class InSitu(Prestrain):
     """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f; and what acts at
     the first frame, an activation too, is in equilibrium at ``F = 1``, by a stress at rest that balances it.
 
-    Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with constant ``e`` and ``p0``: it
+    Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
     turns with the body. They are strain and pressure of an isotropic body under the forces that act at rest, of the shear and
     bulk modulus at rest of the scene's effects: of all stresses that balance these forces, the one of least energy. Springs of
     attachments are extended at rest, and bones press there, as those on which that body stands: a bone wherever the muscle

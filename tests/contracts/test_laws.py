@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -292,3 +293,10 @@ def test_a_stress_at_rest_is_the_one_wanted_and_turns_with_the_body() -> None:
 def test_the_isotropic_body_of_a_stress_at_rest_has_a_bulk_modulus() -> None:
     assert in_situ.moduli_of((make("neo_hooke"), make("incompressible"))) == pytest.approx((0.01, 10))
     assert in_situ.moduli_of((make("neo_hooke"),)) == pytest.approx((0.01, 0.1))
+
+
+def test_a_bone_that_may_support_at_rest_has_a_stress_though_it_is_never_reached() -> None:
+    """Of the stiffness, 0.5 MPa/mm, times the depth below the distance at which it is felt."""
+    scene = SimpleNamespace(near={"femur": SimpleNamespace(gap=2.0, depth=0.0, frame=0.0)})
+    found = [make("contact", **support).indicator(scene) for support in ({}, {"support": "3 mm"})]
+    assert [one.stress for one in found] == pytest.approx([0.0, 0.5 * (3.0 + 0.3 - 2.0)])
