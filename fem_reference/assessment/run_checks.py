@@ -11,6 +11,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
+from fem_reference.effects import in_situ
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances
@@ -147,21 +148,23 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact attachments: vertices at the pose of their bone, up to strain times their distance from the attached facets. Springs:
-    their mean extension, which is the force over stiffness and area.
+    their mean extension, the force over stiffness and area; in situ they have a force at rest.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
     weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
+    at_rest = 0.0 if forces is None or in_situ.among(problem.effects) is None else float(forces[0])
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
             off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * facets_away
-            places = run.positions[i][entry.vertices]
-            yield _at(f"{entry.attachment} off {entry.bone.name}", off, allowed, number, places)
+            yield _at(
+                f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
+            )
         elif forces is not None and skin is not None:
             mean = float(np.linalg.norm(weights @ away) / weights.sum())
-            yielded = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
+            yielded = (float(forces[i]) + at_rest) / (entry.stiffness * float(skin.areas.sum()))
             yield RunCheck(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
 
 

@@ -15,22 +15,25 @@ class Contact(Interaction):
     """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
-    distance below which a bone is felt. ``bones``: their names, by default all.
+    distance below which a bone is felt. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
+    distance within which a bone may press at rest, through what lies between and is in no mesh, as a capsule or a bursa; by
+    default it does where the muscle touches it.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}
     stiffness: AreaStiffness
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
+    support: PositiveLength | None = None
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The possible penetration of the surface into bones, and the pressure there."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
-        depth = math.hypot(*(one.depth for one in near.values()))
-        reached = [f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing]
+        depth, felt = math.hypot(*(one.depth for one in near.values())), self.smoothing + (self.support or 0.0)
+        reached = [f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < felt]
         rule = f"guaranteed clearance to bones [mm] ({'; '.join(reached) or 'no bone is reached'})"
-        return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
+        return Indicator(rule, gap, depth, self.stiffness * max(depth, felt - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
         """True where the bone of this name is in contact."""

@@ -33,11 +33,4 @@ class Prestretch(Ramped, Prestrain):
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
         """The deformation gradient (3, 3) that the energies see."""
-        f = state.fibre
-        along = 1 + state.amount * (self.stretch - 1)
-        across = 1 / state.functions.sqrt(along)
-        stretched = [sum(F * a for F, a in zip(row, f, strict=True)) for row in state.F]
-        return [
-            [across * F + (along - across) * Ff * a for F, a in zip(row, f, strict=True)]
-            for row, Ff in zip(state.F, stretched, strict=True)
-        ]
+        return state.stretched(1 + state.amount * (self.stretch - 1))

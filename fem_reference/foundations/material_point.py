@@ -92,6 +92,15 @@ class State:
         """``J^(-1/3) |F fibre|``: the stretch of the fibre, without its share in the change of volume."""
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
+    def stretched(self, along: Any) -> Sequence[Sequence[Any]]:
+        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after a stretch l ``along`` the fibre f at the same volume."""
+        across = 1 / self.functions.sqrt(along)
+        ends = [sum(F * a for F, a in zip(row, self.fibre, strict=True)) for row in self.F]
+        return [
+            [across * F + (along - across) * end * a for F, a in zip(row, self.fibre, strict=True)]
+            for row, end in zip(self.F, ends, strict=True)
+        ]
+
     def between(self, low: Any, high: Any, x: Any) -> Any:
         """``x``, or the nearer bound where it lies beyond the bounds."""
         above = self.functions.above

@@ -42,12 +42,16 @@ class ContactLaw:
 
     ``relaxed``: two frame numbers. A point that overlaps at the first has its depth reduced to no pressure there, and feels
     its full depth from the second on: an overlap at rest is removed gradually.
+
+    ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
+    there, with the pressure that balances the tension (``effects.in_situ``); later a point feels the change of its gap.
     """
 
     on: str | Skin
     stiffness: float
     smoothing: float
     relaxed: tuple[float, float] | None = None
+    in_situ: float | None = None
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
@@ -56,10 +60,15 @@ class ContactLaw:
         pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
         return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
 
+    def gap(self, pressure: Floats) -> Floats:
+        """The gap (n,) [mm] of pressures (n,) [MPa] from 0 on."""
+        k, d = self.stiffness, self.smoothing
+        return np.where(pressure > k * d, -pressure / k, d - 2 * np.sqrt(d * pressure / k))
+
     def allowance(self, frame: float) -> float:
         """The share of the overlap at rest that is subtracted at ``frame``."""
         if self.relaxed is None:
-            return 0.0
+            return float(self.in_situ is not None)
         first, last = self.relaxed
         return float(np.clip((last - frame) / (last - first), 0, 1))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-from fem_reference.effects import Effect, Interaction
+from fem_reference.effects import Effect, Interaction, in_situ
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
@@ -285,12 +285,14 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
-    """The body with its bones in contact; where they overlap it at rest, it is relaxed before the first frame."""
+    """The body with its bones in contact; where they overlap it at rest, it is relaxed before the first frame, unless in situ."""
     pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
     nearest = min((nearest_at_rest(bone.name, bone.shape, points) for bone in pressing), default=np.inf)
-    before = first - RELAXING if nearest < effect.smoothing else None
-    law = ContactLaw(skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
+    tense = in_situ.among(body.effects) is not None
+    before = first - RELAXING if nearest < effect.smoothing and not tense else None
+    relaxed, support = None if before is None else (before, first), effect.support or 0.0 if tense else None
+    law = ContactLaw(skin, effect.stiffness, effect.smoothing, relaxed, support)
     frames = body.frames if before is None else (before, *body.frames)
     posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
     return replace(body, frames=frames, contact=law, bones=posed)

@@ -24,11 +24,11 @@ _MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
 
 
-def first_piola(acting: Acting, state: State, count: int) -> Floats:
+def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
     """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of what is ``acting``, (effect, amount) each, at a
-    ``state`` whose F are the jets.
+    ``state`` whose F are the jets, and of a stress ``at_rest``.
     """
-    energy = total_energy(acting, state)
+    energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
     return np.asarray(np.broadcast_to(slope.reshape(9, -1), (9, count)).T.reshape(count, 3, 3))
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import roots_jacobi
 
-from fem_reference.effects import Effect, Energy, State, elastic_state
+from fem_reference.effects import Effect, Energy, State, elastic_state, in_situ
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.material_point import NUMPY, Functions
@@ -170,10 +170,9 @@ class _Places:
         gradient = np.einsum("nai,nak->nik", inside, self.slopes)
         return np.asarray(np.einsum("na,nai->ni", self.functions, inside)), np.eye(3) + gradient
 
-    @property
-    def pressure(self) -> Floats | None:
-        """The pressure unknown (n,) [MPa], None where the element has none."""
-        inside = self.state.pressure[self.tets]
+    def _pressure(self, of_cells: Floats) -> Floats | None:
+        """A pressure (n,) [MPa] from that of cells (m, l), None where the element has none."""
+        inside = of_cells[self.tets]
         if inside.shape[1] == 0:
             return None
         return inside[:, 0] if inside.shape[1] == 1 else np.asarray((inside * self.corners).sum(axis=1))
@@ -185,7 +184,8 @@ class _Places:
             "deformation_gradient": self.F,
             "det_F": self.det_F,
         }
-        values["pressure"] = self.pressure
+        at_rest = self.state.response_pressure if len(self.state.response) else np.zeros(1)
+        values["pressure"] = self._pressure(self.state.pressure + at_rest)
         if {"cauchy_stress", "von_mises", "fibre_stress"} & set(names):
             stress = self.cauchy_stress(acting)
             values |= {"cauchy_stress": stress, "von_mises": von_mises(stress)}
@@ -204,7 +204,7 @@ class _Places:
         with np.errstate(all="ignore"):  # where det F is not positive
             jets = variables(self.F.reshape(-1, 9).T, curved=False)
             now = self._state([jets[0:3], jets[3:6], jets[6:9]], JET_FUNCTIONS)
-            first = first_piola(acting, now, len(self.tets))
+            first = first_piola(acting, now, len(self.tets), self._at_rest(now))
             stress = np.einsum("nik,njk->nij", first, self.F) / self.det_F[:, None, None]
         stress[~(self.det_F > 0)] = np.nan
         return np.asarray(stress)
@@ -216,6 +216,20 @@ class _Places:
             for effect, amount in acting:
                 if isinstance(effect, Energy):
                     yield type(effect).__module__.rpartition(".")[2], effect.energy(replace(now, amount=amount))
+            if len(self.state.response):
+                whole = self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY)
+                yield "in_situ", self._at_rest(whole)
+
+    def _at_rest(self, state: State) -> Any:
+        """The energy per rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 of another."""
+        if not len(self.state.response):
+            return 0.0
+        slopes = self._moved(self.state.response)[1] - np.eye(3)
+        shear, bulk = in_situ.moduli_of(self.results.effects)
+        pressure = self._pressure(self.state.response_pressure)
+        if pressure is None:
+            pressure = bulk * np.trace(slopes, axis1=1, axis2=2)
+        return in_situ.balancing(state, [list(row) for row in np.moveaxis(slopes, 0, -1)], pressure, shear)
 
     def _state(self, F: Sequence[Sequence[Any]], functions: Functions) -> State:
         """The points as effects see them, with the entries of ``F`` as numbers or variables."""
@@ -226,7 +240,7 @@ class _Places:
         return State(
             F=F,
             displacement=list(self.displacement.T),
-            pressure=self.pressure,
+            pressure=self._pressure(state.pressure),
             fibre=fibre,
             before=list(before.T),
             F_before=[list(row) for row in np.moveaxis(F_before, 0, -1)],

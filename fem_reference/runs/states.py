@@ -8,7 +8,7 @@
 
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ MOST_BYTES = 2**30
 # Arrays by name.
 Arrays = dict[str, NDArray[Any]]
 _ARRAYS = ("displacement", "pressure", "before", "rate")
+_IN_SITU = ("response", "response_pressure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,24 +38,28 @@ class NodalState:
     or none (l = 0).
 
     Where an effect depends on velocities, also the displacement ``before`` (m, k, 3) [mm] at the start of the last load step, and
-    the inverse ``rate`` [1/s] of its duration; else (0, 0, 3) and 0.
+    the inverse ``rate`` [1/s] of its duration; else (0, 0, 3) and 0. Of a body in situ, also the ``response`` (m, k, 3) [mm] and
+    ``response_pressure`` (m, l) [MPa] that give its stress at rest (``effects.in_situ``); else (0, 0, 3) and (0, 0).
     """
 
     displacement: Floats
     pressure: Floats
     before: Floats
     rate: float = 0.0
+    response: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    response_pressure: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def arrays(self) -> Arrays:
         """The arrays to write, by name."""
-        return {name: getattr(self, name) for name in _ARRAYS}
+        return {name: getattr(self, name) for name in (*_ARRAYS, *(_IN_SITU if len(self.response) else ()))}
 
     @classmethod
     def of(cls, arrays: Mapping[str, ArrayLike]) -> "NodalState":
         """The state of ``arrays`` by name; KeyError where one is missing."""
         displacement, pressure, before, rate = (np.asarray(arrays[name], float) for name in _ARRAYS)
-        return cls(displacement, pressure, before, float(rate))
+        own = {name: np.asarray(arrays[name], float) for name in _IN_SITU if name in arrays}
+        return cls(displacement, pressure, before, float(rate), **own)
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:

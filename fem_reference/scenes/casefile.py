@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect, Load, Ramped, moduli
+from fem_reference.effects import Effect, FieldEffect, Load, Ramped, in_situ, moduli
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -257,11 +257,15 @@ def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> No
 
 
 def _check_rest(case: MuscleCase) -> None:
-    """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
+    """At the first frame every bone is where its surface is, and nothing acts that comes and goes, unless a stress at rest
+    balances it: the muscle rests.
+    """
     for i, effect in enumerate(case.effects):
-        if isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0:
+        acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
+        if acts and in_situ.among(case.effects) is None:
             got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
-            raise InputError(join(case.place, f"effect[{i}].ramp"), got, "0 there, where the muscle rests")
+            want = '0 there, where the muscle rests, or the effect "in_situ", which balances it'
+            raise InputError(join(case.place, f"effect[{i}].ramp"), got, want)
     for i, bone in enumerate(case.bone):
         pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
@@ -276,6 +280,10 @@ def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, p
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):
             _check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
+            if effect.support is not None and in_situ.among(acting) is None:
+                raise InputError(
+                    join(place, f"effect[{i}].support"), f"{effect.support:g} mm", 'it beside "in_situ" only'
+                )
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
             raise InputError(join(place, "frames.interval"), "nothing", want)

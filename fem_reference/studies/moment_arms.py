@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment import experiments
-from fem_reference.assessment.moment_arms import ArmsBeside, ArmRange, fitted_arms, poses, range_of
+from fem_reference.assessment.moment_arms import ArmRange, ArmsBeside, fitted_arms, poses, range_of
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import context_of

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from fem_reference.assessment.moment_arms import ArmsBeside, ArmRange, fitted_arms, overlap, poses, range_of, share_inside
+from fem_reference.assessment.moment_arms import (
+    ArmRange,
+    ArmsBeside,
+    fitted_arms,
+    overlap,
+    poses,
+    range_of,
+    share_inside,
+)
 from fem_reference.foundations.errors import InputError
 
 ANGLES = np.linspace(0, 57.3, 11)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from acting import (
 from scipy.spatial.transform import Rotation
 from scipy.special import expi
 
-from fem_reference.effects import State, total_energy
+from fem_reference.effects import State, in_situ, total_energy
 
 # The laws: dW/dl of F = diag(l, l^-1/2, l^-1/2) with the fibre along x, written out from the papers. Central differences with a
 # step of 1e-5 err by 1e-10 of the third derivative, which is below 1e4 times the slope here.
@@ -296,3 +297,33 @@ def test_the_total_energy_is_the_sum_with_each_amount_and_no_load() -> None:
     F = deformations()[1]
     parts = [effect.energy(state(F, amount=amount)) for effect, amount in acting[:3]]
     assert total_energy(acting, state(F)) == pytest.approx(sum(parts), rel=1e-14)
+
+
+def test_a_stress_at_rest_is_the_one_wanted_and_turns_with_the_body() -> None:
+    """``2 mu dev(e) + p0`` at F = 1, by central differences; its energy there is none, and is the same after a rotation."""
+    rng = np.random.default_rng(3)
+    slopes, mu, pressure, step = rng.uniform(-1, 1, (3, 3)), 0.3, 0.7, 1e-6
+
+    def energy(F: np.ndarray) -> float:
+        return float(in_situ.balancing(State(F), slopes, pressure, mu))
+
+    strain = (slopes + slopes.T) / 2
+    wanted = 2 * mu * (strain - np.trace(strain) / 3 * np.eye(3)) + pressure * np.eye(3)
+    changes = step * np.eye(9).reshape(3, 3, 3, 3)
+    found = [[(energy(np.eye(3) + h) - energy(np.eye(3) - h)) / (2 * step) for h in row] for row in changes]
+    assert np.array(found) == pytest.approx(wanted, abs=1e-9)
+    assert energy(np.eye(3)) == pytest.approx(0, abs=1e-15)
+    for F in deformations():
+        assert energy(TURN @ F) == pytest.approx(energy(F), abs=1e-14)
+
+
+def test_the_isotropic_body_of_a_stress_at_rest_has_a_bulk_modulus() -> None:
+    assert in_situ.moduli_of((make("neo_hooke"), make("incompressible"))) == pytest.approx((0.01, 10))
+    assert in_situ.moduli_of((make("neo_hooke"),)) == pytest.approx((0.01, 0.1))
+
+
+def test_a_bone_that_may_support_at_rest_has_a_stress_though_it_is_never_reached() -> None:
+    """Of the stiffness, 0.5 MPa/mm, times the depth below the distance at which it is felt."""
+    scene = SimpleNamespace(near={"femur": SimpleNamespace(gap=2.0, depth=0.0, frame=0.0)})
+    found = [make("contact", **support).indicator(scene) for support in ({}, {"support": "3 mm"})]
+    assert [one.stress for one in found] == pytest.approx([0.0, 0.5 * (3.0 + 0.3 - 2.0)])

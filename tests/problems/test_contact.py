@@ -77,3 +77,13 @@ def test_what_overlaps_at_rest_is_felt_more_and_more() -> None:
     law = ContactLaw("skin", 1.0, 0.1, relaxed=(-4.0, 0.0))
     assert [law.allowance(frame) for frame in (-5.0, -4.0, -3.0, -2.0, 0.0, 7.0)] == [1, 1, 0.75, 0.5, 0, 0]
     assert ContactLaw("skin", 1.0, 0.1).allowance(-4.0) == 0
+
+
+def test_a_gap_is_that_of_its_pressure() -> None:
+    gaps = np.array([-3.0, -D, -0.4 * D, 0.0, 0.9 * D, D])
+    assert LAW.gap(LAW.pressure(gaps)[0]) == pytest.approx(gaps, abs=1e-12)
+
+
+def test_a_body_in_situ_feels_the_change_of_its_gap_at_any_frame() -> None:
+    law = ContactLaw("skin", 1.0, 0.1, in_situ=0.0)
+    assert [law.allowance(frame) for frame in (-4.0, 0.0, 7.0)] == [1, 1, 1]

@@ -98,6 +98,11 @@ WRONG = [
         PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
         "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
     ),
+    (
+        "effect[0]",
+        {"name": "contact", "stiffness": "1 kPa/mm", "support": "3 mm"},
+        'effect[0].support: got 3 mm, want it beside "in_situ" only',
+    ),
     ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
     ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),
     ("title", 3, "title: got 3, want a valid string"),
@@ -221,6 +226,15 @@ def test_all_that_is_wrong_with_keys_is_said_at_once(bar: Path) -> None:
 def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
     with pytest.raises(InputError, match="got nothing, want a key that this scene has"):
         casefile.read(bar, changes={key: 1})
+
+
+def test_a_muscle_in_situ_may_have_a_tone_and_supports_at_rest(bar: Path) -> None:
+    tone = {"name": "fibre_active", "stress": "300 kPa", "optimal_stretch": 1.0, "ramp": [{"frame": 0, "amount": 0.02}]}
+    contact = {"name": "contact", "stiffness": "1 kPa/mm", "support": "3 mm"}
+    given = [{"name": "neo_hooke", "mu": "10 kPa"}, {"name": "in_situ", "stretch": 1.1}, tone, contact]
+    scene = changed(bar, "effect", given)
+    assert scene.effects[2].amount(0) == 0.02
+    assert scene.effects[3].support == 3
 
 
 def test_a_change_that_leads_nowhere_says_what_there_is(bar: Path) -> None:

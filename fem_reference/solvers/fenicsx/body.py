@@ -18,7 +18,7 @@ from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
-from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
+from fem_reference.solvers.fenicsx import compiling, contact_points, forms, in_situ, meshes
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
@@ -70,14 +70,17 @@ class AssembledBody:
         self.stability = Stability(self.system, cast(Factorised, self.linear)) if counts else None
         self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
         self.system.balance_units()
+        in_situ.balance(form, self.system, self.linear, settings.residual)
         self.path = Path(self.system, self.determinants)
+        if form.rest is not None:
+            self.path.settle(self.energy(), connected=False)
         inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, self
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
         self.at = body.frames[0]  # the frame of the last good state
-        self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock)
+        self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock, form.rest)
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         if isinstance(entry.on, str):

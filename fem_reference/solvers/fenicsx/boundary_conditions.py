@@ -24,6 +24,7 @@ class PrescribedRegion:
         self.dofs: Ints = np.ravel(self.all[:, self.along])  # prescribed exactly or by springs
         self.exact = self.dofs if entry.stiffness is None else np.zeros(0, np.int64)
         self.wanted = fem.Function(displacement.space)
+        self.extension = np.zeros_like(self.rest)
 
     @property
     def prescribed(self) -> Floats:
@@ -42,7 +43,14 @@ class PrescribedRegion:
 
     def move_to(self, frame: float) -> None:
         """Prescribe the displacement of the path at ``frame``."""
-        self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(self.rest, frame)
+        ends = self.rest - self.extension
+        self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(ends, frame) - self.extension
+
+    def extend(self, response: Floats) -> None:
+        """Extend springs at rest by the ``response`` (n,) of the unknowns: a path moves the end of each that far back."""
+        if self.entry.stiffness is not None:
+            self.extension = np.where(np.isin(np.arange(3), self.along), response[self.all], 0.0)
+            self.wanted.x.array.reshape(-1, 3)[self.nodes] = -self.extension
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] on this rank's part of the region and its moment (3,) [N mm] about the origin, from the
@@ -64,9 +72,9 @@ class PointSprings:
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
         assert entry.stiffness is not None  # body.check ensures it
         self.entry, self.unknowns, self.points = entry, unknowns, points
-        along = np.isin(np.arange(3), entry.components)
+        self.along = along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
-        self.wanted = np.array(points.rest)
+        self.ends = self.wanted = np.array(points.rest)  # of the springs, at rest
 
     @property
     def prescribed(self) -> Floats:
@@ -75,7 +83,11 @@ class PointSprings:
 
     def move_to(self, frame: float) -> None:
         """Prescribe the displacement of the path at ``frame``."""
-        self.wanted = self.points.rest + self.entry.path(self.points.rest, frame)
+        self.wanted = self.ends + self.entry.path(self.ends, frame)
+
+    def extend(self, response: Floats) -> None:
+        """Extend springs at rest, as ``PrescribedRegion.extend`` does."""
+        self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the spring forces to ``residual`` over this rank's unknowns; linearly advanced by ``moves`` (n,) of them, where

@@ -63,7 +63,8 @@ class ContactForces:
         self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         patches = Patches(points)
-        self.nearby = [Nearby(entry.shape, law.smoothing, patches) for entry in bones]
+        reach = law.smoothing + (law.in_situ or 0.0)
+        self.nearby = [Nearby(entry.shape, reach, patches) for entry in bones]
         self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
         self.update(frame)
         if law.relaxed:

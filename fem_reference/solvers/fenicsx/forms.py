@@ -1,7 +1,10 @@
 """The weak form of a body, summed from its effects; symbols stand for parameters, so that one compiled form serves many."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import compress, pairwise
+from operator import not_
 from typing import Any, NamedTuple
 
 import basix.ufl
@@ -17,6 +20,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes
 from fem_reference.solvers.fenicsx.meshes import DEGREE, geometry, rule
+from fem_reference.solvers.fenicsx.rest_stress import rest_stress
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 Rule = tuple[Floats, Floats]
@@ -45,7 +49,7 @@ class Form:
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
     fibres). To be set: the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
     ``kinetic``: the energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
-    ``degree``; ``regions``: this rank's facets by name.
+    ``degree``; ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
     """
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
@@ -65,8 +69,10 @@ class Form:
         state, variables = _state(unknowns, self._fibre(body, cells), self.step)
         self.determinant = state.J
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
+        self.rest = rest_stress(unknowns, body.effects)
+        at_rest = 0 if self.rest is None else self.rest.energy(state)
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
-        self.energy = total_energy(stored, state) * self.dx
+        self.energy = (total_energy(stored, state) + at_rest) * self.dx
         self.kinetic: Any = 0
         if self.step is not None and (velocity := self.step.velocity) is not None:
             moving: list[Any] = [effect for effect in effects if "momentum" in effect.needs]
@@ -75,11 +81,11 @@ class Form:
         self.kinds = 3 if isinstance(by_place, Zero) else 4
         self.silent = [_silent(effect, body.frames) for effect in body.effects]
         instants = [*body.frames, *((a + b) / 2 for a, b in pairwise(body.frames))]
-        self._made: dict[tuple[bool, ...], Derivatives] = {}
-        for quiet in dict.fromkeys(map(self._quiet, instants)):
-            kept = [one for one, off in zip(acting, quiet, strict=True) if not off]
-            first, second = _differentiated(total_energy(kept, state), variables, self.kinds)
-            self._made[quiet] = Derivatives(*compiling.expressions(first + second, points, len(first)))
+        self._made = {
+            quiet: self._derivatives(total_energy(list(compress(acting, map(not_, quiet))), state) + at_rest, variables)
+            for quiet in dict.fromkeys(map(self._quiet, instants))
+        }
+        self._isotropic = None if self.rest is None else self._derivatives(self.rest.isotropic(state), variables)
         self.set_amounts(body.frames[0])
         self.loads = self._loads(acting, state, unknowns)
 
@@ -92,6 +98,18 @@ class Form:
     def _quiet(self, frame: float) -> tuple[bool, ...]:
         """True for each effect that is left out at a frame."""
         return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
+
+    @contextmanager
+    def isotropic(self) -> Iterator[None]:
+        """A context with the derivatives of the isotropic body that gives a body in situ its stress at rest."""
+        assert self._isotropic is not None  # of a body in situ
+        own, self.derivatives = self.derivatives, self._isotropic
+        yield
+        self.derivatives = own
+
+    def _derivatives(self, energy: Any, by: tuple[Any, Any, Any]) -> Derivatives:
+        first, second = _differentiated(energy, by, self.kinds)
+        return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
         test, loads = ufl.TestFunction(unknowns.function_space), 0

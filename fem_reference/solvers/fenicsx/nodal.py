@@ -1,5 +1,7 @@
 """Positions and unknowns of a body's nodes and cells on every rank, in an order that readers without FEniCSx understand."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
@@ -7,15 +9,19 @@ from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.meshes import Displacement, tabulate
+from fem_reference.solvers.fenicsx.rest_stress import RestStress
 
 
 class Nodal:
     """Gathers what belongs to the ``cells`` of a body from the ranks that own them."""
 
-    def __init__(self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock) -> None:
+    def __init__(
+        self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock, rest: RestStress | None
+    ) -> None:
         """``own``: the cells that are this rank's, in the rank's order."""
         kind, degree, order = ELEMENTS[element]
         self.cells, self.own, self.clock, self.unknowns = cells, own, clock, displacement.unknowns.x
+        self.rest = rest
         self.comm = displacement.space.mesh.comm
         self.moves = displacement.tabulated(reference_nodes(cells.kind, cells.degree), len(own))
         self.displacement = displacement.tabulated(reference_nodes(kind, degree), len(own))
@@ -33,14 +39,25 @@ class Nodal:
 
     def state(self) -> NodalState:
         """The present state of all cells."""
-        displacement = self.gathered(self.displacement.at(self.unknowns.array))
-        pressure, before, rate = np.zeros((len(displacement), 0)), np.zeros((0, 0, 3)), 0.0
-        if self.pressure is not None:
-            pressure = self.gathered(self.pressure.at(self.unknowns.array)[..., 0])
+        before, rate = np.zeros((0, 0, 3)), 0.0
         if self.clock.step is not None:
-            before = self.gathered(self.displacement.at(self.clock.step.before.x.array))
+            before = self._displaced(self.clock.step.before.x.array)
             rate = float(self.clock.step.rate.value)
-        return NodalState(displacement, pressure, before, rate)
+        found = NodalState(self._displaced(self.unknowns.array), self._pressed(self.unknowns.array), before, rate)
+        if self.rest is None:
+            return found
+        response = self.rest.response.x.array
+        return replace(found, response=self._displaced(response), response_pressure=self._pressed(response))
+
+    def _displaced(self, unknowns: Floats) -> Floats:
+        """The displacement (m, k, 3) [mm] of all cells in ``unknowns`` (n,)."""
+        return self.gathered(self.displacement.at(unknowns))
+
+    def _pressed(self, unknowns: Floats) -> Floats:
+        """The pressure (m, l) [MPa] of all cells in ``unknowns`` (n,), l = 0 where there is none."""
+        if self.pressure is None:
+            return np.zeros((len(self.cells.cells), 0))
+        return self.gathered(self.pressure.at(unknowns)[..., 0])
 
     def gathered(self, mine: Floats | Ints) -> Floats:
         """The rows of all cells (m, ...) from those of this rank's own, on every rank."""

@@ -215,7 +215,11 @@ class Worker:
 def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
     """March a body through its frames on all ranks, or solve for a scalar field on one; ``report`` receives the frames."""
     if isinstance(job, Job):
-        return Worker(job, report).run()
+        try:
+            worker = Worker(job, report)
+        except ArithmeticError as error:
+            return Outcome("diverged", f"at rest: {error}")
+        return worker.run()
     values, outcome = assembled_field.solve(job)
     report(Frame.of_field(job, values, job.form))
     return outcome

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 from scipy.sparse.linalg import splu
 
+from fem_reference.effects import in_situ
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
@@ -58,6 +59,9 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
+    if in_situ.among(body.effects) is not None:
+        want = "effects that leave the body at rest, as this solver balances no tension there"
+        raise InputError("effects", "in_situ", want)
     begin = time.perf_counter()
     march_of = March(body, settings)
     sink(march_of.state(Step(body.frames[0])))

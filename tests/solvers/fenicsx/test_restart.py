@@ -5,6 +5,8 @@ import pytest
 
 pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
 
+from tense import in_situ, muscle
+
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
@@ -47,3 +49,20 @@ def test_a_state_out_of_balance_with_other_effects_is_not_gone_on_from(tmp_path)
     restart = Restart(other, kept(CutOff(tmp_path, (1,)), body(mu=0.7)))
     assert restart.good() == ()
     assert not other.unknowns.x.array.any()
+
+
+def test_a_body_in_situ_goes_on_from_its_tension(tmp_path) -> None:
+    """The stress at rest, which is in no file, is found again."""
+    settings = BodySettings(element="P2/P1", first_step=1.0)
+    pull = Affine(((0.0, 0.0, 0.0),) * 3, (0.5, 0.0, 1.0))
+    tense = muscle(in_situ(1.1), top=pull, frames=(0.0, 1.0, 2.0))
+    first = AssembledBody(tense, settings)
+    assert first.attempt(1.0).converged
+    Restart(first, kept(CutOff(tmp_path, ()), tense)).write(1, {"size": 1.0, "cost": {}})
+    again = AssembledBody(tense, settings)
+    restart = Restart(again, kept(CutOff(tmp_path, (1,)), tense))
+    assert restart.good() == (1,)
+    restart.go_on((1,))
+    assert np.array_equal(again.unknowns.x.array, first.unknowns.x.array)
+    assert again.energy() == pytest.approx(first.energy(), rel=1e-12)
+    assert again.system.residual() <= settings.residual

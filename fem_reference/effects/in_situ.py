@@ -1,0 +1,54 @@
+"""Tension at rest: the given mesh is the muscle in the body, with fibres that are stretched there, in equilibrium."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Effect, Prestrain, State, moduli
+
+
+class InSitu(Prestrain):
+    """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f; and what acts at
+    the first frame, an activation too, is in equilibrium at ``F = 1``, by a stress at rest that balances it.
+
+    Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
+    turns with the body. They are strain and pressure of an isotropic body under the forces that act at rest, of the shear and
+    bulk modulus at rest of the scene's effects: of all stresses that balance these forces, the one of least energy. Springs of
+    attachments are extended at rest, and bones press there, as those on which that body stands: a bone wherever the muscle
+    touches it or is within ``support`` of it (``contact``), through what lies between.
+
+    ``stretch``: without unit, above 1 where fibres are taut at rest; 1 where only an activation acts there.
+    Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find by iteration a prestrain with this
+    stretch that is in equilibrium; here its incompatible part is a constant stress, found by one linear problem.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"stretch": 1.1}
+    stretch: float = Field(gt=0)
+
+    def elastic(self, state: State) -> Sequence[Sequence[Any]]:
+        """The deformation gradient (3, 3) that the energies see."""
+        return state.stretched(self.stretch)
+
+
+def among(acting: Iterable[object]) -> InSitu | None:
+    """The tension at rest among the effects of a scene, None where there is none."""
+    return next((effect for effect in acting if isinstance(effect, InSitu)), None)
+
+
+def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
+    """The shear and bulk modulus [MPa] of the isotropic body: those at rest of ``effects``; where these have no bulk modulus, ten
+    times the shear modulus.
+    """
+    found = moduli(effects)
+    return found.shear, found.bulk or 10 * found.shear
+
+
+def balancing(state: State, slopes: Sequence[Sequence[Any]], pressure: Any, shear: Any) -> Any:
+    """The energy per rest volume [MPa] of the stress at rest at ``state``, whose F is the whole deformation gradient; ``e`` is the
+    symmetric part of ``slopes`` (3, 3), mu the modulus ``shear`` [MPa] and p0 the ``pressure`` [MPa].
+    """
+    C, mean = state.C, sum(slopes[i][i] for i in range(3)) / 3
+    strained = sum((slopes[i][k] + slopes[k][i]) / 2 * (C[i][k] - (i == k)) for i in range(3) for k in range(3))
+    return shear * (strained - mean * (state.I1 - 3)) + pressure * (state.J - 1)
