@@ -40,7 +40,7 @@ class ViperSettings(Record):
     radius away from bones, or what they have at rest, and the surface leaves bones; off where the key is omitted.
     """
 
-    points: Annotated[int, Field(ge=4), Trade((4, 6, 12))]
+    points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
     iterations: Annotated[int, Field(gt=0), Trade((5, 20, 80))]
     stretch: Stiffness
     bending: Stiffness
