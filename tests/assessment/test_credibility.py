@@ -19,7 +19,7 @@ from fem_reference.assessment.credibility import (
     row,
 )
 from fem_reference.assessment.experiments import facts, find
-from fem_reference.assessment.moment_arms import ArmsBeside, Range
+from fem_reference.assessment.moment_arms import ArmRange, ArmsBeside
 from fem_reference.assessment.muscle_cubes import QUANTITIES
 from fem_reference.verification import runner
 from tests.verification.stand_ins import entry
@@ -42,7 +42,7 @@ def graded(*beside: Beside) -> Row:
 
 def arms(low: float, high: float, published: tuple[float, float], muscle: str = "gluteus_maximus") -> ArmsBeside:
     at = np.arange(0.0, 20.0, 2.0)
-    sides = [Range(at, np.full(10, one), np.full(10, other)) for one, other in ((low, high), published)]
+    sides = [ArmRange(at, np.full(10, one), np.full(10, other)) for one, other in ((low, high), published)]
     names = ("case", muscle, "extension", "someone", "coarse")
     return ArmsBeside(*names, sides[0], np.full(10, (low + high) / 2), sides[1], 0.1)
 
