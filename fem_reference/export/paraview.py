@@ -13,7 +13,7 @@ import numpy as np
 
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.effects.contact import among
+from fem_reference.effects import contact, in_situ
 from fem_reference.export import forces
 from fem_reference.export.folders import new_folder, write_text
 from fem_reference.foundations.mesh import Floats, Ints, Surface
@@ -86,7 +86,8 @@ class _Frames:
         if gaps is not None:
             yield "distance_to_bones", gaps
         if run is self.reference:
-            if gaps is not None and among(self.case.effects) is not None:
+            pressed = contact.among(self.case.effects) is not None and in_situ.among(self.case.effects) is None
+            if gaps is not None and pressed:  # in situ it follows from the gaps at rest, which only the solver knows
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -99,7 +100,7 @@ class _Frames:
 
     def _contact_pressure(self) -> Floats:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
-        effect = among(self.case.effects)
+        effect = contact.among(self.case.effects)
         assert effect is not None  # the caller asked
         law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
         bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, Prestrain, Ramped, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Prestrain, Ramped, State, elastic_state, in_situ, total_energy
 from fem_reference.effects.contact import among
 from fem_reference.foundations.indicators import Estimates
 from fem_reference.foundations.jets import JET_FUNCTIONS, Jet, variables
@@ -137,14 +137,21 @@ class Watch:
         """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), where it has tetrahedra."""
         acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
         self.frames[number] = surface, None if tets is None else self.sampled.sizes(tets, acting, others)
-        return self._found(number, max(self.known.stress_tolerance, STRESS_TOLERANCE * self._most()))
+        estimated = self.known.stress_tolerance
+        return self._found(number, estimated if self._tense else max(estimated, STRESS_TOLERANCE * self._most()))
 
     def end(self) -> tuple[Decision, ...]:
         """The effects that matter, at the first of all frames at which one does, now that all stresses are known."""
         if any(stresses is None for _, stresses in self.frames.values()):
             return ()
         tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
+        tolerance = min(tolerance, self.known.stress_tolerance) if self._tense else tolerance
         return next((found for number in sorted(self.frames) if (found := self._found(number, tolerance))), ())
+
+    @property
+    def _tense(self) -> bool:
+        """True in situ."""
+        return in_situ.among(self.case.effects) is not None
 
     def _most(self) -> float:
         return float(np.max([stresses.acts if stresses else 0.0 for _, stresses in self.frames.values()]))

@@ -44,7 +44,8 @@ def label(ablation: Ablation, omission: Omission) -> str:
     """The things left out, in words: "all of them" where they are."""
     if not omission.left_out:
         return "nothing"
-    if len(omission.left_out) > 1 and len(omission.left_out) == len(ablation.omissions) - 1:
+    every = {name for one in ablation.omissions for name in one.left_out}
+    if len(every) > 1 and set(omission.left_out) == every:
         return "all of them"
     return listed([words(name) for name in omission.left_out])
 

@@ -137,6 +137,11 @@ class Results:
         if shapes not in allowed:
             want = f"({m}, 4 or 10, 3) and ({m}, 0, 1 or 4), as the mesh has {m} tetrahedra"
             raise InputError(f"state at frame {frame:g}", f"arrays {shapes[0]} and {shapes[1]}", want)
+        own = state.response.shape, state.response_pressure.shape
+        if in_situ.among(self.effects) is not None and own != shapes:
+            got = f"arrays response {own[0]} and response_pressure {own[1]}"
+            want = f"{shapes[0]} and {shapes[1]}: the stress at rest of a muscle in situ follows from them"
+            raise InputError(f"state at frame {frame:g}", got, want)
         return state
 
 

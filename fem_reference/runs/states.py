@@ -106,7 +106,7 @@ class StoredStates(Mapping[float, NodalState]):
             raise KeyError(frame)
         if self.last is None or self.last[0] != frame:
             place = _place(self.folder, frame)
-            arrays = read_arrays(place, _ARRAYS)
+            arrays = read_arrays(place, _ARRAYS, _IN_SITU)
             try:
                 self.last = (frame, NodalState.of(arrays))
             except (TypeError, ValueError) as error:
@@ -131,8 +131,10 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
         np.savez(part, allow_pickle=False, **arrays)
 
 
-def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
-    """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
+def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
+    """The arrays of an .npz file by name: those of ``names``, by default all, and of ``also`` those that are there; InputError
+    where it is damaged.
+    """
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:
@@ -141,7 +143,8 @@ def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
                 raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
             file.seek(0)
             with np.load(file, allow_pickle=False) as arrays:
-                return {name: arrays[name] for name in names or arrays.files}
+                there = [name for name in also if name in arrays.files]
+                return {name: arrays[name] for name in (*(names or arrays.files), *there)}
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
         raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error
 

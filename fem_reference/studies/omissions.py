@@ -10,7 +10,8 @@ from typing import Any
 
 from fem_reference import effects, metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
-from fem_reference.effects import Effect, Energy, Load, Ramped
+from fem_reference.effects import Effect, Energy, Load, Ramped, in_situ
+from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import MeasurementContext, context_of
 from fem_reference.problems import of_case
@@ -34,15 +35,18 @@ LIMIT, COMPILING = 2.0, 60.0
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver; each by name."""
+    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver; each by name. ``support``: True
+    where it includes that of contact at rest.
+    """
 
     effects: dict[str, Effect]
     features: tuple[str, ...] = ()
+    support: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of all of it."""
-        return *self.effects, *self.features
+        return *self.effects, *self.features, *(["support of contact"] if self.support else [])
 
 
 def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
@@ -85,15 +89,26 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
 
 def parts(whole: Trial) -> tuple[LeftOut, ...]:
     """Everything that can be left out of a trial: each effect of the scene but its material where the solver simulates them, else
-    each feature of its own; and all of them, where there are several. Something elastic is left in any case.
+    each feature of its own; and all of them, where there are several. Something elastic is left in any case. With tension at rest
+    goes what only that balances there: effects that act at the first frame, and the support by bones.
     """
     if not solvers.takes_effects(whole.choice.solver):
         found = features(whole.choice, whole.name)
         return *(LeftOut({}, (key,)) for key in found), *([LeftOut({}, found)] if len(found) > 1 else [])
     scene = whole.scene
     named = {name_of(effect): effect for effect in scene.effects if not is_material(effect)}
-    every = [LeftOut({name: effect}) for name, effect in named.items()] + ([LeftOut(named)] if len(named) > 1 else [])
+    every = [_with_rest(scene, {name: effect}, named) for name, effect in named.items()]
+    every += [all_of_it] if (all_of_it := _with_rest(scene, named, named)) not in every and named else []
     return tuple(part for part in every if any(isinstance(one, Energy) and one.stored for one in _kept(scene, part)))
+
+
+def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effect]) -> LeftOut:
+    """The part with ``some`` of the effects that have a name, and what cannot be without them."""
+    if in_situ.among(some.values()) is None:
+        return LeftOut(some)
+    first, contact = case.frames.first, among(case.effects)
+    acting = {name: one for name, one in named.items() if isinstance(one, Ramped) and one.amount(first) != 0}
+    return LeftOut(some | acting, support=contact is not None and contact.support is not None)
 
 
 def without(whole: Trial, part: LeftOut) -> Trial:
@@ -109,7 +124,10 @@ def without(whole: Trial, part: LeftOut) -> Trial:
 
 
 def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
-    return tuple(effect for effect in case.effects if effect not in part.effects.values())
+    """The effects that are left."""
+    kept = tuple(effect for effect in case.effects if effect not in part.effects.values())
+    contact = among(kept) if part.support else None
+    return tuple(one.model_copy(update={"support": None}) if one is contact else one for one in kept)
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:

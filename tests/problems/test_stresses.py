@@ -74,6 +74,20 @@ def test_an_effect_whose_stress_is_no_number_is_needed(tmp_path) -> None:
         assert [one.effect.title for one in watch.see(0, rest, rest)] == titles
 
 
+@pytest.mark.parametrize("tense", [False, True])
+def test_in_situ_an_effect_is_judged_by_the_estimate(tmp_path, tense) -> None:
+    """What acts there, without the stress at rest that balances it, is no measure: 1 MPa, of which 1 kPa would be nothing."""
+    weight = random_scenes.EFFECTS["gravity"].format(density=1e-6, weight="0, 0, -9.81")
+    tension = '[[effect]]\nname = "in_situ"\nstretch = 1.1\n' if tense else ""
+    watch = Bench(pennate(tmp_path / "scene", "auto", tension + weight), tmp_path / "runs").watch()
+    rest = watch.rest.surface.points
+    watch.sampled = SimpleNamespace(sizes=lambda *_: StressSizes(1.0, (1e-3,), (1.0, 1.0)))
+    wanted = ["Gravity"] if tense else []
+    assert watch.known.stress_tolerance < 1e-3
+    assert [one.effect.title for one in watch.see(0, rest, rest)] == wanted
+    assert [one.effect.title for one in watch.end()] == wanted
+
+
 def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:
     """Bones rest, so that there is no drag by what is known before; the solution moves."""
     made = solved_as(

@@ -29,6 +29,16 @@ def test_a_prediction_stands_beside_what_was_measured_where_there_is_one(tmp_pat
     assert [row["verdict"] for row in table["ablations"][0]["omissions"]] == ["matters", "does not matter"]
 
 
+def test_only_what_leaves_out_all_is_called_all_of_them() -> None:
+    """With tension at rest go a tone and the support by bones: three names, as many as all effects have."""
+    tense, every = ("in_situ", "tone", "support of contact"), ("in_situ", "tone", "contact", "support of contact")
+    rows = tuple(omission(*names) for names in (tense, ("tone",), ("contact",), every))
+    whole = replace(found().ablations[0], omissions=rows)
+    said = [effects_page.label(whole, row) for row in rows]
+    assert said[0] == "in situ, tone and support of contact"
+    assert said[1:] == ["tone", "contact", "all of them"]
+
+
 def test_a_failure_is_a_row_with_its_cause_and_a_change_of_nothing_is_drawn(tmp_path) -> None:
     failed = Omission(("contact", "gravity"), "diverged", "frame 3: <b>lost</b>", instead={"element": "P2"})
     whole = found(failed)

@@ -298,3 +298,39 @@ def test_a_run_without_states_another_scene_or_a_damaged_file_is_named(tmp_path)
     (tmp_path / "run" / "state" / "frame_0000.npz").write_bytes(b"PK\x03\x04 half")
     with pytest.raises(InputError, match=r"frame_0000.npz: .* want the arrays displacement, pressure, before, rate"):
         states.StoredStates(tmp_path / "run", (0,))[0]
+
+
+IN_SITU = (*MATRIX, make("in_situ"))
+
+
+def in_situ() -> NodalState:
+    """A state in situ, whose stress at rest varies."""
+    own = moved(lambda X: 1e-3 * X**2, lambda X: 0.01 * X[..., 1])
+    return replace(moved(affine(F)), response=own.displacement, response_pressure=own.pressure)
+
+
+def test_a_stored_state_in_situ_has_its_stress_at_rest(tmp_path) -> None:
+    """What was written is what was solved: stress, pressure and energies are as in memory, to rounding, and not as without it."""
+    stored(tmp_path / "run", in_situ())
+    read = states.StoredStates(tmp_path / "run", (0,))
+    kept, back = (Results(MESH, IN_SITU, one, FIBRES) for one in ({0: in_situ()}, read))
+    bare = Results(MESH, MATRIX, {0: moved(affine(F))}, FIBRES)
+    one, other, without = (made.evaluate(POINTS, 0) for made in (kept, back, bare))
+    for name, values in one.items():
+        assert other[name] == pytest.approx(values, rel=1e-12, abs=1e-15), name
+    for name in ("pressure", "cauchy_stress"):
+        assert np.abs(one[name] - without[name]).max() > 1e-3
+    assert back.energies(0) == pytest.approx(kept.energies(0), rel=1e-12)
+    assert abs(back.energies(0)["in_situ"]) > 1e-3
+
+
+def test_a_state_in_situ_without_its_stress_at_rest_is_refused(tmp_path) -> None:
+    half = replace(in_situ(), response_pressure=np.zeros((0, 0)))
+    for name, state in (("none", moved(affine(F))), ("half", half)):
+        stored(tmp_path / name, state)
+        made = Results(MESH, IN_SITU, states.StoredStates(tmp_path / name, (0,)), FIBRES)
+        for ask in (lambda made: made.evaluate(POINTS, 0), lambda made: made.energies(0)):
+            with pytest.raises(
+                InputError, match=r"state at frame 0: got arrays response .* response_pressure \(0, 0\)"
+            ):
+                ask(made)

@@ -70,6 +70,45 @@ def test_what_is_left_is_the_scene_that_one_would_write_without_it(tmp_path) -> 
     assert (trial.choice, trial.label) == (scene.reference, "reference, without = gravity")
 
 
+TENSE = """
+[[effect]]
+name = "in_situ"
+stretch = 1.1
+"""
+TONE = """
+[[effect]]
+name = "fibre_active"
+stress = "300 kPa"
+optimal_stretch = 1.0
+ramp = [{{ frame = 0, amount = {tone} }}, {{ frame = 5, amount = 0.5 }}]
+"""
+
+
+@pytest.mark.parametrize(("tone", "support"), [(0.05, True), (0.05, False), (0.0, True)])
+def test_with_tension_at_rest_goes_what_only_that_balances(tmp_path, tone, support) -> None:
+    """Without it a tone at the first frame and bones that support the muscle are no rest: a scene that is refused when read."""
+    active, bones = TONE.format(tone=tone), CONTACT + ('support = "3 mm"\n' if support else "")
+    scene = scene_in(tmp_path / "bar", TENSE + active + bones + GRAVITY.format(g=-9.81))
+    trial = Trial(scene, scene.reference, "reference")
+    also = (*(["fibre_active"] if tone else []), *(["support of contact"] if support else []))
+    parts = omissions.parts(trial)
+    singles = [("fibre_active",), ("contact",), ("gravity",)]
+    every = ("in_situ", "fibre_active", "contact", "gravity", *(["support of contact"] if support else []))
+    assert [part.names for part in parts] == [("in_situ", *also), *singles, every]
+    written = scene_in(tmp_path / "written", ("" if tone else active) + CONTACT + GRAVITY.format(g=-9.81))
+    assert omissions.without(trial, parts[0]).scene.key == written.key
+    for part in parts[1:4]:
+        kept = omissions.without(trial, part).scene.effects
+        assert scene.effects[2] in kept  # the tension
+        assert part.names == ("contact",) or any(getattr(one, "support", None) for one in kept) == support
+
+
+def test_what_is_all_is_left_out_once(tmp_path) -> None:
+    scene = scene_in(tmp_path / "bar", TENSE + TONE.format(tone=0.05))
+    parts = omissions.parts(Trial(scene, scene.reference, "reference"))
+    assert [part.names for part in parts] == [("in_situ", "fibre_active"), ("fibre_active",)]
+
+
 def test_an_element_has_a_pressure_only_as_long_as_an_effect_brings_it(tmp_path) -> None:
     matrix, volume, penalty = (
         make("neo_hooke", mu="10 kPa"),

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from fem_reference.effects import Effect
+from fem_reference.effects.in_situ import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
@@ -126,7 +127,8 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
     if scalars.get("outside_law", 0) > 0:
         note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
     if is_first and (overlap := scalars.get("overlap_at_rest", 0.0)) > 0:
-        note += f", {overlap:.2g} mm of overlap with bones at rest removed"
+        stays = among(problem.effects) is not None
+        note += f", {overlap:.2g} mm of overlap with bones at rest {'that stays' if stays else 'removed'}"
     pulls = _loads(problem, frame) if loads else {}
     pulls |= {f"force_{name}": float(np.linalg.norm(force)) for name, force in frame.forces.items()}
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):

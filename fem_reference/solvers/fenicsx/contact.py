@@ -67,6 +67,7 @@ class ContactForces:
         self.nearby = [Nearby(entry.shape, reach, patches) for entry in bones]
         self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
         self.update(frame)
+        self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # at rest, at most
         if law.relaxed:
             for overlap, one in zip(self.overlaps, self.now, strict=True):
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
@@ -149,17 +150,17 @@ class ContactForces:
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point; the rest area in contact,
         ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries, ``contact_points_near``; and
-        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm].
+        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm], where it is removed or, in situ, stays.
         """
         comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
-        depth = pressure = overlap = 0.0
-        for one, before in zip(self.now, self.overlaps, strict=True):
+        depth = pressure = 0.0
+        for one in self.now:
             touched[one.pressed] = True
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
-            overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
         greatest = {"contact_depth": depth, "contact_pressure": pressure}
-        greatest |= {"overlap_at_rest": max(overlap, 0.0)} if self.law.relaxed else {}
+        kept = self.law.in_situ is not None
+        greatest |= {"overlap_at_rest": self.overlap} if self.law.relaxed or kept else {}
         sums = {
             "contact_area": float(self.points.areas[touched].sum()),
             "contact_points": float(touched.sum()),

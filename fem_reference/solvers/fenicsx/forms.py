@@ -104,8 +104,10 @@ class Form:
         """A context with the derivatives of the isotropic body that gives a body in situ its stress at rest."""
         assert self._isotropic is not None  # of a body in situ
         own, self.derivatives = self.derivatives, self._isotropic
-        yield
-        self.derivatives = own
+        try:
+            yield
+        finally:
+            self.derivatives = own
 
     def _derivatives(self, energy: Any, by: tuple[Any, Any, Any]) -> Derivatives:
         first, second = _differentiated(energy, by, self.kinds)

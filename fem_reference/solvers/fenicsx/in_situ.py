@@ -48,16 +48,19 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 
 class Supports:
-    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there."""
+    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there, which the
+    smoothing does not change; other points within that feel nothing at rest.
+    """
 
     def __init__(self, contact: ContactForces) -> None:
         self.contact, self.law, rest = contact, contact.law, contact.points.rest
         poses = [bone.pose(contact.frame) for bone in contact.bones]
         placed = zip(contact.bones, poses, strict=True)
         found = [bone.shape.sample((rest - pose[:3, 3]) @ pose[:3, :3]) for bone, pose in placed]
-        within = self.law.smoothing + (self.law.in_situ or 0.0)
-        self.near = [np.flatnonzero(one.distance < within) for one in found]
+        support = self.law.in_situ or 0.0
+        self.near = [np.flatnonzero(one.distance < self.law.smoothing + support) for one in found]
         self.gaps = [one.distance[near] for one, near in zip(found, self.near, strict=True)]
+        self.touch = [gap <= support for gap in self.gaps]
         turned = zip(found, self.near, poses, strict=True)
         self.normals = [one.gradient[near] @ pose[:3, :3].T for one, near, pose in turned]
         self.press(np.zeros(len(contact.unknowns.x.array)))
@@ -81,8 +84,7 @@ class Supports:
         return found
 
     def _depths(self, response: Floats) -> list[Floats]:
-        """The depths to which the ``response`` (n,) of the unknowns takes the points, by bone."""
+        """The depths to which the ``response`` (n,) of the unknowns takes the points, by bone; below 0 where none touches."""
         moved = self.contact.points.positions(response) - self.contact.points.rest
-        return [
-            -np.einsum("ni,ni->n", moved[near], normal) for near, normal in zip(self.near, self.normals, strict=True)
-        ]
+        placed = zip(self.near, self.normals, self.touch, strict=True)
+        return [np.where(touch, -np.einsum("ni,ni->n", moved[near], normal), -np.inf) for near, normal, touch in placed]

@@ -86,6 +86,20 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
     assert depths[0] < first["contact_depth"] + 0.05
 
 
+@pytest.mark.usefixtures("needs_fenicsx")
+def test_in_situ_an_overlap_at_rest_stays_and_is_reported(tmp_path) -> None:
+    """The same overlap; nothing moves at the first frame, to the residual over the stiffness."""
+    tense = f'[[effect]]\nname = "in_situ"\nstretch = 1.01\n\n{CONTACT}'
+    case = scene(tmp_path / "bar", -4.6, tense)
+    case = case.model_copy(update={"frames": case.frames.model_copy(update={"last": 5})})
+    frames, _ = solved(case)
+    first = frames[0]
+    assert first.surface == pytest.approx(muscle.setup(case).surface.points, abs=1e-5)
+    assert first.scalars["overlap_at_rest"] == pytest.approx(first.scalars["contact_depth"], abs=1e-5)
+    assert first.scalars["overlap_at_rest"] == pytest.approx(0.46, abs=0.05)
+    assert "of overlap with bones at rest that stays" in first.note
+
+
 def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
     rest = muscle.setup(case)

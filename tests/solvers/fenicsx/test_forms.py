@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tense import in_situ, muscle
 
 pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
 
@@ -88,3 +89,18 @@ def test_an_activation_that_is_zero_over_frames_is_not_summed_there() -> None:
     assert np.abs(late[2] - never[2]).max() > 1e-3
     _, always = activated([(0, 0.0), (6, 1.0)])
     assert len({id(one) for one in always}) == 1
+
+
+def test_after_a_failure_the_isotropic_body_is_not_summed() -> None:
+    built = AssembledBody(muscle(in_situ(1.0)), BodySettings(element="P2/P1"))
+    form = built.system.cells.form
+    own = form.derivatives
+
+    def failed() -> None:
+        with form.isotropic():
+            assert form.derivatives is not own
+            raise ArithmeticError("a linear problem that is singular")
+
+    with pytest.raises(ArithmeticError, match="singular"):
+        failed()
+    assert form.derivatives is own

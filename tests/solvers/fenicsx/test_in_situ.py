@@ -101,11 +101,13 @@ def test_ranks_find_the_same_rest(session) -> None:  # noqa: ARG001 - it skips w
     assert found[0]["force_top"] > 0.1
 
 
-def supported(support: float, gap: float, *, pull: float = 0.0) -> Body:
+def supported(support: float, gap: float, *, pull: float = 0.0, smoothing: float = 0.1) -> Body:
     """A bar whose curved fibres straighten towards a ball beside its middle, across a gap; its top is pulled up by ``pull``."""
     ball = ContactBone("ball", Sphere((30.0 + gap, 5.0, 20.0), 20.0), Slide((0.0, 0.0, 0.0)))
     top = Affine(((0.0,) * 3, (0.0,) * 3, (0.0,) * 3), (0.0, 0.0, pull))
-    return replace(muscle(in_situ(1.1), top=top), contact=ContactLaw("x1", 0.5, 0.1, in_situ=support), bones=(ball,))
+    return replace(
+        muscle(in_situ(1.1), top=top), contact=ContactLaw("x1", 0.5, smoothing, in_situ=support), bones=(ball,)
+    )
 
 
 @pytest.mark.parametrize("overlap", [False, True])
@@ -118,14 +120,27 @@ def test_a_bone_within_reach_presses_at_rest(session, overlap) -> None:
     assert sum(last.forces.values()) == pytest.approx(np.zeros(3), abs=1e-7)
     assert sum(last.moments.values()) == pytest.approx(np.zeros(3), abs=1e-5)
     assert last.scalars["contact_pressure"] > 0
+    # The ball is 0.5 mm deep, and points of contact 2 mm beside its middle are 0.1 mm less; nothing moves.
+    overlap_at_rest = last.scalars["overlap_at_rest"]
+    assert overlap_at_rest == pytest.approx(last.scalars["contact_depth"], abs=1e-6)
+    assert 0.3 < overlap_at_rest < 0.5 if overlap else overlap_at_rest == 0
 
 
-def test_a_bone_out_of_reach_does_not_press(session) -> None:
-    body = supported(0.1, 0.5)
+@pytest.mark.parametrize("smoothing", [0.1, 1.0])
+def test_a_bone_out_of_reach_does_not_press(session, smoothing) -> None:
+    """Also where the law is felt farther away than a bone supports: what it says of the gaps at rest is no force."""
+    body = supported(0.1, 0.5, smoothing=smoothing)
     last = solved(session, body).last
     assert moved(solved(session, body), body) < 1e-6
     assert np.linalg.norm(last.forces["ball"]) == 0
     assert last.forces["top"][0] + last.forces["bottom"][0] == pytest.approx(0, abs=1e-7)
+
+
+def test_the_smoothing_does_not_change_what_supports_at_rest(session) -> None:
+    """Points of the face are 0.5 mm and more from the ball, within 0.7 mm of it or not; the residual is 1e-9 N."""
+    one, other = (solved(session, supported(0.7, 0.5, smoothing=smoothing)).last for smoothing in (0.5, 0.05))
+    assert one.forces["ball"][0] < -0.01
+    assert other.forces["ball"] == pytest.approx(one.forces["ball"], abs=1e-6)
 
 
 def test_a_bone_presses_more_on_a_muscle_that_is_pulled_and_less_on_a_slack_one(session) -> None:
