@@ -39,6 +39,7 @@ class ArmStudy:
 
 STUDIES = (
     ArmStudy("gluteus_maximus", 11.2, 100, "gluteus_maximus", "extension", (NEMETH, BLEMKER)),
+    ArmStudy("gluteus_maximus_anatomical", 14.0, 100, "gluteus_maximus", "extension", (NEMETH, BLEMKER)),
     ArmStudy("iliacus_anatomical", 7.0, 100, "iliacus", "flexion", (BLEMKER,)),
 )
 
