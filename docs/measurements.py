@@ -144,8 +144,9 @@ def _credibility_arms() -> str:
     rows = []
     for one in kept("credibility")["measured"]["arms"]:
         offsets = (f"{one[key]:.1f} mm" for key in ("bias", "scatter", "coarser"))
-        rows.append((f"`{one['case']}`", one["experiment"], f"{100 * one['share']:.0f} %", *offsets))
-    head = ("case", "beside", "inside, or covered", "bias", "scatter over the poses", "on larger tetrahedra")
+        beside = f"{one['experiment']} ({one['kind']})"
+        rows.append((f"`{one['case']}`", beside, f"{100 * one['share']:.0f} %", one["poses"], *offsets))
+    head = ("case", "beside", "inside, or covered", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
     return table("credibility", head, rows)
 
 
