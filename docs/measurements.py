@@ -97,22 +97,29 @@ def _comparison_worst() -> str:
 
 
 def _credibility(found: dict[str, Any]) -> Any:
-    keys = ("name", "title", "unit", "value", "truth", "within", "n", "met", "validates")
+    keys = ("name", "title", "unit", "value", "truth", "within", "n", "met", "validates", "kind", "is_order")
     rows = [
-        {key: row[key] for key in ("quantity", "grade", "bar", "band")}
+        {key: row[key] for key in ("quantity", "grade", "bar", "band", "measurement", "model")}
         | {"beside": [{key: one[key] for key in keys} for one in row["beside"]]}
         for row in found["rows"]
     ]
-    fits = [{key: one[key] for key in ("law", "parameters", "values", "inside")} for one in found["fits"]]
+    fits = [
+        {key: one[key] for key in ("law", "parameters", "values", "inside", "converged", "evaluations")}
+        for one in found["fits"]
+    ]
     return {"rows": rows, "arms": found["arms"], "fits": fits}
 
 
 def _credibility_grades() -> str:
     rows = []
     for one in kept("credibility")["measured"]["rows"]:
-        met = f"{sum(each['met'] for each in one['beside'])} of {len(one['beside'])}" if one["beside"] else "none"
-        rows.append((one["quantity"], met, one["bar"], " to ".join(one["band"]), one["grade"]))
-    head = ("quantity", "experiments within their uncertainty", "numerical bar", "model band", "grade")
+        met = (
+            f"{found['met']} of {found['of']}" if found["of"] else "none"
+            for found in (one["measurement"], one["model"])
+        )
+        rows.append((one["quantity"], *met, one["bar"], " to ".join(one["band"]), one["grade"]))
+    measured = ("measurements within their uncertainty", "other models as near as asked for")
+    head = ("quantity", *measured, "numerical bar", "model band", "grade")
     return table("credibility", head, rows)
 
 
@@ -121,13 +128,15 @@ def _credibility_cubes() -> str:
     found = [each for row in measured["rows"] for each in row["beside"] if each["unit"] == "1"]
     rows = []
     for one in found:
-        order = (one["truth"], one["within"]) == (1.0, 0.5)
+        order = one["is_order"]
         cells = [fit["values"].get(one["name"], "") for fit in measured["fits"]]
         said = [("yes" if cell > 0.5 else "no") if order and cell != "" else cell for cell in (one["value"], *cells)]
         known = "yes" if order else f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = [number(cell) if isinstance(cell, float) else cell for cell in said]
         rows.append((one["title"], said[0], known, "within" if one["met"] else "outside", *said[1:]))
-    laws = (f"best fit: {fit['law']}" for fit in measured["fits"])
+    laws = (
+        f"{'best fit' if fit['converged'] else 'fit that did not converge'}: {fit['law']}" for fit in measured["fits"]
+    )
     return table("credibility", ("", "shipped material", "measured", "", *laws), rows)
 
 
@@ -135,8 +144,9 @@ def _credibility_arms() -> str:
     rows = []
     for one in kept("credibility")["measured"]["arms"]:
         offsets = (f"{one[key]:.1f} mm" for key in ("bias", "scatter", "coarser"))
-        rows.append((f"`{one['case']}`", one["experiment"], f"{100 * one['share']:.0f} %", *offsets))
-    head = ("case", "beside", "inside, or covered", "bias", "scatter over the poses", "on larger tetrahedra")
+        beside = f"{one['experiment']} ({one['kind']})"
+        rows.append((f"`{one['case']}`", beside, f"{100 * one['share']:.0f} %", one["poses"], *offsets))
+    head = ("case", "beside", "inside, or covered", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
     return table("credibility", head, rows)
 
 

@@ -76,7 +76,8 @@ class Entry:
 
     An entry of the kind "experiment" lays a model beside a muscle: its word is within or outside the uncertainty of the
     experiment, and neither fails. It fails where the value is not the ``pinned`` one any more. ``facts``: the measured numbers
-    that its truth is made of.
+    that its truth is made of; ``is_order``: True where it is an order, which is met (1) or not (0), to a half; ``from_memory``:
+    True where a part of its model or of its source is from memory.
     """
 
     name: str
@@ -98,6 +99,8 @@ class Entry:
     slow_negative_control: bool = False
     pinned: float | None = None
     facts: tuple[Fact, ...] = ()
+    is_order: bool = False
+    from_memory: bool = False
 
     def known(self) -> float:
         """The truth, in the unit of the entry."""

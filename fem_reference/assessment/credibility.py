@@ -12,13 +12,14 @@ import numpy as np
 
 from fem_reference.assessment import experiments
 from fem_reference.assessment.catalogue import Entry, Result
-from fem_reference.assessment.experiments import Fact
+from fem_reference.assessment.experiments import Fact, Kind
 from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
 _ROUNDED = 0.5  # of a share that is published in whole per cent
-# "outside": the model differs from an experiment by more than its uncertainty, whatever else it meets.
+_WHOLE = 100.0  # per cent of the poses
+# "outside": the model differs from a measurement by more than its uncertainty, whatever else it meets.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
@@ -50,8 +51,9 @@ def claims() -> tuple[Evidence, ...]:
 
 @dataclass(frozen=True)
 class Beside:
-    """A value of the model beside a measured one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
-    specimens, None where unknown; ``validates``: whether being within would count as validation.
+    """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
+    specimens, None where unknown; ``validates``: whether being within would count as validation; ``kind``: measurement, or model
+    where another model is the truth; ``is_order``: True of an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -64,11 +66,14 @@ class Beside:
     met: bool
     validates: bool
     remark: str = ""
+    kind: Kind = "measurement"
+    is_order: bool = False
 
-    @property
-    def is_order(self) -> bool:
-        """True of an order, which is met (1) or not (0), to a half."""
-        return (self.truth, self.within) == (1.0, 0.5)
+
+def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
+    """The number of comparisons of a ``kind`` that are met, and of all of it."""
+    met = [one.met for one in several if one.kind == kind]
+    return sum(met), len(met)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +89,20 @@ class Row:
     beside: tuple[Beside, ...]
 
     @property
-    def met(self) -> int:
-        """The number of comparisons within their uncertainty."""
-        return sum(one.met for one in self.beside)
+    def measured(self) -> tuple[int, int]:
+        """The number of measurements within whose uncertainty the model is, and of all."""
+        return count(self.beside, "measurement")
+
+    @property
+    def models(self) -> tuple[int, int]:
+        """The number of other models that are as near as was asked for, and of all; they are no evidence of a muscle."""
+        return count(self.beside, "model")
 
     @property
     def misses(self) -> tuple[float, ...]:
         """The deviations from measured numbers, orders left out, over their uncertainties."""
-        return tuple((one.value - one.truth) / one.within for one in self.beside if not one.is_order)
+        measured = [one for one in self.beside if one.kind == "measurement" and not one.is_order]
+        return tuple((one.value - one.truth) / one.within for one in measured)
 
     @property
     def bias(self) -> float:
@@ -105,12 +116,13 @@ class Row:
 
     @property
     def grade(self) -> Grade:
-        """Outside where one comparison is, else validated by one that counts, indicative by others; verified only where no
-        experiment is known, and not measured where its data is not here.
+        """Outside where one measurement is, else validated by one that counts, indicative by others; verified only where no
+        experiment is known, and not measured where its data is not here. Other models do not enter.
         """
-        if not self.beside:
+        met, of = self.measured
+        if of == 0:
             return "not measured" if self.claim.arms or self.claim.experiments else "verified only"
-        if self.met < len(self.beside):
+        if met < of:
             return "outside"
         return "validated" if any(one.validates for one in self.beside) else "indicative"
 
@@ -133,42 +145,49 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 def of_result(found: Result) -> Beside:
     """A measured entry of the kind experiment; it counts only where every fact does, and no part of its model is from memory."""
     entry = found.entry
-    from_memory = "memory" in entry.source
     facts = entry.facts
-    counted = not from_memory and bool(facts) and all(one.validates for one in facts)
+    counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
     n = experiments.least_specimens(facts)
     met = found.word == "within"
     return Beside(
         *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
         remark=found.finding.note,
+        is_order=entry.is_order,
     )
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms beside a curve or a range: the share inside or the overlap [%] that Modenese and Kohout 2020 reach."""
+    """Moment arms beside a measured curve, which is to be inside in all poses, or beside another model's range, of which as much is
+    to be covered [%] as Modenese and Kohout 2020 cover.
+    """
     quantity = "share_inside" if arms.is_curve else "overlap"
     reached = experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " "))
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
     title = f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.experiment})"
-    share = 100 * arms.share
+    share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else reached.value
+    others = f"; fibres of another model of this body reach {reached.value:g} %" if arms.kind == "measurement" else ""
     return Beside(
-        *(f"{arms.case}-{arms.experiment}", title, "%", share, reached.value, _ROUNDED, None),
-        *(share >= reached.value - _ROUNDED, False),
-        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {len(arms.found.angles)} poses; "
-        f"{arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm",
+        *(f"{arms.case}-{arms.experiment}", title, "%", share, truth, _ROUNDED, None),
+        *(share >= truth - _ROUNDED, False),
+        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over the {arms.known} of {len(arms.found.angles)} poses in "
+        f"which the published arm is known; {arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm{others}",
+        kind=arms.kind,
     )
 
 
 @dataclass(frozen=True)
 class Fitted:
     """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
-    None where none is known, and the ``values`` of all quantities by name.
+    None where none is known, and the ``values`` of all quantities by name; ``converged``: True where the fit ended at a least sum
+    of squares, False where its ``evaluations`` ran out before.
     """
 
     law: str
     parameters: Mapping[str, tuple[float, tuple[float, float] | None]]
     values: Mapping[str, float]
     to: tuple[str, ...]
+    converged: bool
+    evaluations: int
 
     @property
     def inside(self) -> bool | None:

@@ -17,6 +17,7 @@ from fem_reference.scenes.case import HOME
 FOLDER = HOME / "validation" / "experiments"
 NAME = "measured.csv"
 _NUMBERS = {"value": float, "sd": float, "n": int}
+Kind = Literal["measurement", "model", "bands"]
 _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -45,11 +46,13 @@ class Fact(Record):
 
 
 class Experiment(Record):
-    """An experiment: its ``specimen``, its ``boundary`` conditions, what our scene repeats of it and what not; ``file``, in the
-    folder of ``FEM_REFERENCE_DATA``: a whole curve.
+    """An experiment, of the ``kind`` measurement, model or, of numbers of several publications, bands: its ``specimen``, its
+    ``boundary`` conditions, what our scene repeats of it and what not; ``file``, in the folder of ``FEM_REFERENCE_DATA``: a whole
+    curve.
     """
 
     title: _Text
+    kind: Kind
     source: _Text
     specimen: _Text
     boundary: _Text

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from fem_reference.assessment.experiments import Kind
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 
@@ -77,8 +78,8 @@ class ArmsBeside:
     [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, the ``published`` range, whose sides are equal where
     it is one curve.
 
-    ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run; ``coarser``: the greatest change
-    of the mean arm over the poses [mm] on larger tetrahedra.
+    ``kind``: that of the experiment; ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run;
+    ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str
@@ -90,6 +91,7 @@ class ArmsBeside:
     middle: Floats
     published: ArmRange
     coarser: float
+    kind: Kind
 
     @property
     def is_curve(self) -> bool:
@@ -114,7 +116,14 @@ class ArmsBeside:
         return float(self._off.std()) if self._off.size else float("nan")
 
     @property
+    def known(self) -> int:
+        """The number of poses in which the published arm is known: share, bias and scatter are over these."""
+        return int(np.isfinite(self._centre).sum())
+
+    @property
+    def _centre(self) -> Floats:
+        return np.asarray((self.published.low + self.published.high) / 2)
+
+    @property
     def _off(self) -> Floats:
-        centre = (self.published.low + self.published.high) / 2
-        known = np.isfinite(centre)
-        return np.asarray((self.middle - centre)[known])
+        return np.asarray((self.middle - self._centre)[np.isfinite(self._centre)])

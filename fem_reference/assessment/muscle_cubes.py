@@ -24,6 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty
     ``within`` ``because`` of what; ``of`` gives it of a material. ``limit``: the reason why the shipped law cannot reach it.
+    ``is_order``: True of an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Quantity:
     because: str
     limit: str = ""
     unit: str = "1"
+    is_order: bool = False
 
 
 def with_collagen(fibres: float, k1: float, k2: float) -> Material:
@@ -153,7 +155,8 @@ def _tension() -> Quantity:
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
     because = "An order: 1 where it is met by 1 % and more, 0 where not."
-    return Quantity(name, f"Cube in compression: {title}", fact.experiment, of, (fact,), 1.0, 0.5, because, limit)
+    title = f"Cube in compression: {title}"
+    return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit, is_order=True)
 
 
 _MIDWAY, _ACROSS = find(LOOCKE, "softest_angle", ""), find(WALTER, "stiffest_angle", "")

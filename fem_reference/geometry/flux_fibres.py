@@ -60,7 +60,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     By Crouzeix and Raviart's elements, whose gradients are the lowest order of Raviart and Thomas: what leaves a tetrahedron
     enters the next exactly (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
-    triangles = np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1)
+    triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
     faces, count = numbers.reshape(-1, 4), len(first)
     inverse = np.linalg.inv(edge_vectors(mesh.points[mesh.tets]))
@@ -97,8 +97,13 @@ def streamlines(flux: Flow, count: int) -> Polylines:
     return Polylines(np.concatenate([resample(lines[i]) for i in kept]), np.arange(count + 1) * POINTS)
 
 
+def _triangles(mesh: TetMesh) -> Ints:
+    """The corners (4 k, 3) of the triangles of each tetrahedron, each with its corners in order."""
+    return np.asarray(np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1))
+
+
 def _numbers(triangles: Ints, facets: Ints) -> Ints:
-    """The number (m,) of each of ``facets`` (m, 3) among sorted ``triangles`` (n, 3), each with its corners in order."""
+    """The number (m,) of each of ``facets`` (m, 3) among different ``triangles`` (n, 3), each with its corners in order."""
     _, numbers = np.unique(np.concatenate([triangles, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
     return np.asarray(numbers.ravel()[len(triangles) :])
 
@@ -112,16 +117,16 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
     beyond = square.sum(axis=1) > 1
     square[beyond] = 1 - square[beyond]  # the half of the square that is a triangle, for the other
     weights = np.column_stack([1 - square.sum(axis=1), square])
-    triangles = np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1)
+    triangles = _triangles(mesh)
     on = {tuple(corners): number // 4 for number, corners in enumerate(triangles.tolist())}
     tets = np.array([on[tuple(corners)] for corners in np.sort(facets, axis=1).tolist()])
     return tets[facet], np.einsum("ni,nia->na", weights, mesh.points[facets[facet]])
 
 
 def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
-    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that end where the flow leaves, straight in each tetrahedron."""
+    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave by the end of the flow, straight in each tetrahedron."""
     beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
-    passed, leaves = [(going, points)], np.zeros(len(points), bool)
+    passed, arrives, ends = [(going, points)], np.zeros(len(points), bool), _numbers(_triangles(flux.mesh), flux.end)
     for _ in range(len(flux.mesh.tets)):  # a line passes each once
         local = np.einsum("nia,na->ni", flux.rises[tets], points - flux.mesh.points[flux.mesh.tets[tets, 0]])
         rates = np.einsum("nia,na->ni", flux.rises[tets], flux.slopes[tets])
@@ -132,7 +137,7 @@ def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
         time, after, met = np.min(times, axis=1), beyond[tets, side], flux.faces[tets, side]
         points = points + np.where(np.isfinite(time), time, 0.0)[:, None] * flux.slopes[tets]
         passed.append((going, points))
-        leaves[going[(after < 0) & np.isfinite(time)]] = True
+        arrives[going[np.isin(met, ends) & np.isfinite(time)]] = True
         on = (after >= 0) & np.isfinite(time)
         going, points, tets, met = going[on], points[on], after[on], met[on]
         if len(going) == 0:
@@ -140,7 +145,7 @@ def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
     numbers, places = (np.concatenate(parts) for parts in zip(*passed, strict=True))
     order = np.argsort(numbers, kind="stable")
     lines = np.split(places[order], np.cumsum(np.bincount(numbers))[:-1])
-    return [line for line, left in zip(lines, leaves, strict=True) if left]
+    return [line for line, one in zip(lines, arrives, strict=True) if one]
 
 
 def _neighbours(faces: Ints) -> Ints:

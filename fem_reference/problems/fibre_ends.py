@@ -70,7 +70,7 @@ class FibreEnds:
     def facts(self) -> dict[str, float | str]:
         """The number of ends, of those that go on by a tendon, and of those beside their attachment; of these all by name."""
         found: dict[str, float | str] = {"fibre_ends": float(self.by.size)}
-        found["fibre_ends_beyond_2_mm"] = float(self.beside.sum())
+        found["fibre_ends_beside"] = float(self.beside.sum())
         if np.isfinite(self.tendons).any():
             found["fibre_ends_by_tendon"] = float(np.isfinite(self.tendons[:, :, 0]).sum())
         if self.beside.any():

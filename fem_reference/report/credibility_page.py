@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fem_reference.assessment.credibility import Beside, Credibility
+from fem_reference.assessment.credibility import Beside, Credibility, count
 from fem_reference.assessment.experiments import Experiment, experiments
 from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.io.texts import finite, plain
@@ -18,7 +18,7 @@ from fem_reference.report.pages import Page
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
     "indicative": "within what single specimens, quotations or memory say",
-    "outside": "outside of an experiment by more than its uncertainty",
+    "outside": "outside of a measurement by more than its uncertainty",
     "verified only": "no experiment is laid beside it",
     "not measured": "the data of its experiment is not here",
 }
@@ -39,13 +39,13 @@ def page(found: Credibility) -> Page:
 
 
 def said(found: Credibility) -> str:
-    """The number of quantities by grade, and of comparisons that are met."""
+    """The number of quantities by grade, and of comparisons that are met, with measurements and with other models."""
     counts = Counter(str(row.grade) for row in found.rows)
     grades = ", ".join(f"{counts[grade]} {grade}" for grade in GRADES if counts[grade])
     beside = [one for row in found.rows for one in row.beside]
-    return (
-        f"{len(found.rows)} quantities: {grades}; {sum(one.met for one in beside)} of {len(beside)} comparisons within"
-    )
+    (met_by, measured), (near, models) = count(beside, "measurement"), count(beside, "model")
+    within = f"{met_by} of {measured} measurements within their uncertainty"
+    return f"{len(found.rows)} quantities: {grades}; {within}, {near} of {models} other models as near as asked for"
 
 
 def met(values: Mapping[str, float], one: Beside) -> bool | None:
@@ -69,15 +69,19 @@ def facts(found: Credibility) -> dict[str, Any]:
             "other_codes": row.claim.other_codes,
             "bar": row.claim.bar,
             "band": [f"{one.value:g} {one.unit}" for one in row.band],
+            **{
+                kind: dict(zip(("met", "of"), count(row.beside, kind), strict=True))
+                for kind in ("measurement", "model")
+            },
             "beside": [plain(one) for one in row.beside],
         }
         for row in found.rows
     ]
     arms = [
         {
-            **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "setting")},
+            **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "kind", "setting")},
             **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter", "coarser")},
-            "poses": len(one.found.angles),
+            "poses": one.known,
         }
         for one in found.arms
     ]

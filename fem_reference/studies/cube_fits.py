@@ -1,6 +1,7 @@
 """The best fit of laws to measured cubes, beside the shipped material, which is not fitted: what a law could reach at all."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,34 +13,47 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 
 Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
-_ORDER = 0.5  # the uncertainty of an order, which has no slope
 _STEP = 1e-4  # of a parameter's logarithm, against 1e-8 that root finding leaves
+_MOST = 100  # evaluations; these fits converge in at most 30
 _SHEAR = SHIPPED[0].parameters[0][1]
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """The end of a fit: its parameters, and whether it converged in so many evaluations."""
+
+    parameters: tuple[float, ...]
+    converged: bool
+    evaluations: int
 
 
 def shipped_law() -> Fitted:
     """The shipped law, fitted to the cubes of Van Loocke et al. by its shear modulus; its fibres stay, as ratios of stresses do not
     change with the scale of both.
     """
-    to = [one for one in QUANTITIES if one.experiment == LOOCKE and one.within < _ORDER]
-    (shear,) = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
+    to = [one for one in QUANTITIES if one.experiment == LOOCKE and not one.is_order]
+    ended = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
+    (shear,) = ended.parameters
     prior = find("bosboom_2001", "ogden_mu", "")
     assert prior.sd is not None  # the fact has one
     published = ((prior.value - prior.sd) / 1000, (prior.value + prior.sd) / 1000)  # MPa
-    return _of("fibres in tension only", {"shear modulus [MPa]": (shear, published)}, _shipped(shear), to)
+    return _of("fibres in tension only", {"shear modulus [MPa]": (shear, published)}, _shipped(shear), to, ended)
 
 
-def collagen_law(most: int = 12) -> Fitted:
-    """The law with collagen across the fibres, fitted to all quantities but orders in at most so many steps; no published range."""
-    to = [one for one in QUANTITIES if one.within != _ORDER]
-    fibres, k1, k2 = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)
+def collagen_law(most: int = _MOST) -> Fitted:
+    """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at most so many
+    evaluations; no published range.
+    """
+    to = [one for one in QUANTITIES if not one.is_order]
+    ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)
+    fibres, k1, k2 = ended.parameters
     parameters = {"stress of the fibres [MPa]": (fibres, None), "k1 [MPa]": (k1, None), "k2": (k2, None)}
-    return _of("with collagen across the fibres", parameters, with_collagen(fibres, k1, k2), to)
+    return _of("with collagen across the fibres", parameters, with_collagen(fibres, k1, k2), to, ended)
 
 
-def _of(law: str, parameters: Parameters, material: Material, to: Sequence[Quantity]) -> Fitted:
+def _of(law: str, parameters: Parameters, material: Material, to: Sequence[Quantity], ended: _Ended) -> Fitted:
     values = {one.name: one.of(material) for one in QUANTITIES}
-    return Fitted(law, parameters, values, tuple(one.name for one in to))
+    return Fitted(law, parameters, values, tuple(one.name for one in to), ended.converged, ended.evaluations)
 
 
 def _shipped(shear: float) -> Material:
@@ -47,13 +61,13 @@ def _shipped(shear: float) -> Material:
 
 
 def _fitted(
-    material: Callable[[Sequence[float]], Material], to: Sequence[Quantity], start: Sequence[float], most: int = 30
-) -> tuple[float, ...]:
-    """The parameters, all above zero, of the ``material`` that meets the quantities best."""
+    material: Callable[[Sequence[float]], Material], to: Sequence[Quantity], start: Sequence[float], most: int = _MOST
+) -> _Ended:
+    """The parameters, all above zero, of the ``material`` that meets the quantities best, near the ``start``."""
 
     def misses(logs: Floats) -> list[float]:
         made = material([float(one) for one in np.exp(logs)])
         return [(one.of(made) - one.truth) / one.within for one in to]
 
     found = least_squares(misses, np.log(start), diff_step=_STEP, max_nfev=most, xtol=1e-6, ftol=1e-6)
-    return tuple(float(one) for one in np.exp(found.x))
+    return _Ended(tuple(float(one) for one in np.exp(found.x)), bool(found.success), int(found.nfev))

@@ -39,6 +39,7 @@ class ArmStudy:
 
 STUDIES = (
     ArmStudy("gluteus_maximus", 11.2, 100, "gluteus_maximus", "extension", (NEMETH, BLEMKER)),
+    ArmStudy("gluteus_maximus_anatomical", 14.0, 100, "gluteus_maximus", "extension", (NEMETH, BLEMKER)),
     ArmStudy("iliacus_anatomical", 7.0, 100, "iliacus", "flexion", (BLEMKER,)),
 )
 
@@ -54,7 +55,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
     scene = casefile.read_muscle(wanted.case)
     angles, arms = _arms(wanted, wanted.tet_size, store)
     coarser = _arms(wanted, LARGER * wanted.tet_size, store)[1].mean(axis=1) - arms.mean(axis=1)
-    setting = f"{wanted.tet_size:g} mm tetrahedra, not refined"
+    setting, records = f"{wanted.tet_size:g} mm tetrahedra, not refined", experiments.experiments()
     for name in wanted.experiments:
         yield ArmsBeside(
             *(wanted.case, wanted.muscle, wanted.sense, name, setting),
@@ -62,6 +63,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
             middle=arms.mean(axis=1),
             published=published(scene, name, wanted.muscle).at(angles),
             coarser=float(np.abs(coarser).max()),
+            kind=records[name].kind,
         )
 
 

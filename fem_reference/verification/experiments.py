@@ -79,6 +79,8 @@ def _entry(quantity: Quantity) -> Entry:
         + ("" if first.doi_confirmed == "yes" else " (from memory)"),
         pinned=PINNED[quantity.name],
         facts=quantity.facts,
+        is_order=quantity.is_order,
+        from_memory=any(one.doi_confirmed == "no" for one in quantity.facts),
     )
 
 
@@ -96,6 +98,7 @@ ORDERS = Quantity(
     within=0.5,
     because=_ORDER,
     limit=_LIMIT,
+    is_order=True,
 )
 
 
@@ -114,6 +117,8 @@ def _orders(quantity: Quantity, pinned: float, materials: tuple[Material, Materi
         because=quantity.because,
         source="van_loocke_2006, read in: quotation; takaza_2013, from memory",
         pinned=pinned,
+        is_order=quantity.is_order,
+        from_memory=True,
     )
 
 
@@ -139,6 +144,7 @@ ENTRIES = (
         source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture and arm of the model from memory",
         pinned=1.3859333,
         facts=_SARCOMERES,
+        from_memory=True,
     ),
 )
 

@@ -1,6 +1,7 @@
 """Grades follow from comparisons, each comparison from its result, and the stated evidence names what exists."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,8 @@ from fem_reference.assessment.credibility import (
 from fem_reference.assessment.experiments import facts, find
 from fem_reference.assessment.moment_arms import ArmRange, ArmsBeside
 from fem_reference.assessment.muscle_cubes import QUANTITIES
-from fem_reference.verification import runner
+from fem_reference.scenes.case import HOME
+from fem_reference.verification import experiments, runner
 from tests.verification.stand_ins import entry
 
 CLAIM = Evidence(
@@ -31,8 +33,8 @@ SARCOMERES = tuple(find("chen_2016", "sarcomere_length", f"{angle} deg") for ang
 QUOTED = (find("van_loocke_2006", "poisson_ratio", "both strains across"),)
 
 
-def measured(value: float, truth: float = 1.0, known=SARCOMERES, source: str = "chen_2016") -> Result:
-    one = entry("cube", truth=truth, kind="experiment", pinned=value, facts=known, source=source)
+def measured(value: float, known=SARCOMERES, **changes) -> Result:
+    one = entry("cube", kind="experiment", pinned=value, facts=known, **changes)
     return result(one, Finding(value), 0.0, with_negative_control=False)
 
 
@@ -41,22 +43,27 @@ def graded(*beside: Beside) -> Row:
 
 
 def arms(low: float, high: float, published: tuple[float, float], muscle: str = "gluteus_maximus") -> ArmsBeside:
-    at = np.arange(0.0, 20.0, 2.0)
+    """A measured curve where both sides of what was published are the same, else the range of a model."""
+    at, kind = np.arange(0.0, 20.0, 2.0), "measurement" if published[0] == published[1] else "model"
     sides = [ArmRange(at, np.full(10, one), np.full(10, other)) for one, other in ((low, high), published)]
     names = ("case", muscle, "extension", "someone", "coarse")
-    return ArmsBeside(*names, sides[0], np.full(10, (low + high) / 2), sides[1], 0.1)
+    return ArmsBeside(*names, sides[0], np.full(10, (low + high) / 2), sides[1], 0.1, kind)
 
 
 def found() -> Credibility:
     """A small whole: a quantity of each grade, with arms, a fit and a case left out."""
     within, outside = of_result(measured(1.02)), of_result(measured(1.5))
-    order = replace(within, name="cube_softest_midway", value=1.0, truth=1.0, within=0.5)
+    order = of_result(measured(1.0, truth=1.0, within=0.5, is_order=True))
+    order = replace(order, name="cube_softest_midway")
     quoted = of_result(measured(1.02, known=QUOTED))
-    rows = [graded(within, order), graded(quoted), graded(within, outside, of_arms(arms(10, 20, (15, 15)))), graded()]
+    besides = [of_arms(arms(10, 20, (15, 15))), of_arms(arms(10, 20, (15, 30), "iliacus"))]
+    rows = [graded(within, order), graded(quoted), graded(within, outside, *besides), graded()]
     named = [
         replace(one, claim=CLAIM.model_copy(update={"name": f"Q{i}", "arms": i == 2})) for i, one in enumerate(rows)
     ]
-    fit = Fitted("two springs", {"k [MPa]": (0.5, (0.1, 0.2))}, {"cube": 1.04}, ("cube",))
+    fit = Fitted(
+        "two springs", {"k [MPa]": (0.5, (0.1, 0.2))}, {"cube": 1.04}, ("cube",), converged=True, evaluations=9
+    )
     return Credibility(
         tuple(named), (arms(10, 20, (15, 15)), arms(10, 20, (15, 30), "iliacus")), {"lost": "why it was"}, (fit,)
     )
@@ -79,14 +86,62 @@ def test_a_grade_is_as_good_as_the_comparisons() -> None:
 
 
 @pytest.mark.parametrize(
-    ("known", "source"),
-    [((), "x"), (QUOTED, "x"), ((*SARCOMERES, *QUOTED), "x"), (SARCOMERES, "x; the model's arm from memory")],
+    ("known", "from_memory"),
+    [((), False), (QUOTED, False), ((*SARCOMERES, *QUOTED), False), (SARCOMERES, True)],
 )
-def test_what_is_quoted_remembered_or_unknown_never_validates(known, source) -> None:
-    one = of_result(measured(1.02, known=known, source=source))
+def test_what_is_quoted_remembered_or_unknown_never_validates(known, from_memory) -> None:
+    one = of_result(measured(1.02, known=known, from_memory=from_memory))
     assert one.met
     assert not one.validates
     assert of_result(measured(1.02)).validates
+
+
+def test_neither_a_number_nor_a_word_of_a_source_is_a_mode() -> None:
+    """A ratio of 1 known to a half is a number, and a source may bear the word memory."""
+    one = of_result(measured(1.25, within=0.5, source="A memory of muscles"))
+    assert not one.is_order
+    assert one.validates
+    assert graded(one).misses == (0.5,)
+    order = of_result(measured(0.0, within=0.6, is_order=True))
+    assert order.is_order
+    assert graded(order).misses == ()
+
+
+def test_what_is_from_memory_and_what_is_an_order_is_stated_by_the_catalogue() -> None:
+    beside = {name: of_result(one) for name, one in experiments.results().items()}
+    orders = {"cube_softest_midway", "cube_stiffest_across", "cube_both_orders", "cube_both_orders_collagen"}
+    assert {name for name, one in beside.items() if one.is_order} == orders
+    assert not [name for name, one in beside.items() if one.validates]
+    for name, one in experiments.results().items():
+        assert one.entry.from_memory == ("memory" in one.entry.source), name
+
+
+def test_other_models_are_counted_apart_and_decide_no_grade() -> None:
+    """The curve of a measurement is inside in all poses or outside, however many a model reaches; a model's range says neither."""
+    near, far = of_arms(arms(10, 40, (15, 30), "iliacus")), of_arms(arms(10, 20, (15, 30), "iliacus"))
+    inside, beyond = of_arms(arms(10, 20, (15, 15))), of_arms(arms(10, 20, (25, 25)))
+    one = graded(inside, near, far)
+    assert (one.measured, one.models, one.grade) == ((1, 1), (1, 2), "indicative")
+    assert graded(beyond, near).grade == "outside"
+    assert graded(near).grade == "verified only"
+    assert replace(graded(far), claim=CLAIM.model_copy(update={"arms": True})).grade == "not measured"
+    assert len(one.misses) == 1, "the bias is that from measurements"
+
+
+def test_nine_tenths_of_the_poses_are_not_all() -> None:
+    """The fibres of another model contain the measured arm in 91 % of poses; that is no measure of a muscle."""
+    made = arms(10, 20, (15, 15))
+    published = np.where(made.found.angles < 17, 15.0, 25.0)
+    one = of_arms(replace(made, published=ArmRange(made.found.angles, published, published)))
+    assert (one.value, one.truth, one.met) == (pytest.approx(90), 100, False)
+
+
+def test_a_remark_counts_the_poses_in_which_the_published_arm_is_known() -> None:
+    made = arms(10, 20, (15, 15))
+    published = np.where(made.found.angles < 6, 15.0, np.nan)
+    partly = replace(made, published=ArmRange(made.found.angles, published, published))
+    assert partly.known == 3
+    assert "over the 3 of 10 poses in which the published arm is known" in of_arms(partly).remark
 
 
 def test_a_value_that_has_moved_or_is_not_a_number_is_not_met() -> None:
@@ -100,7 +155,7 @@ def test_a_value_that_has_moved_or_is_not_a_number_is_not_met() -> None:
 def test_bias_and_scatter_are_over_the_uncertainties_without_orders() -> None:
     """Misses of 0.02 and 0.5 over 0.1: 0.2 and 5."""
     within, outside = of_result(measured(1.02)), of_result(measured(1.5))
-    order = replace(within, truth=1.0, within=0.5)
+    order = replace(within, is_order=True)
     one = graded(within, outside, order)
     assert (one.bias, one.scatter) == pytest.approx((2.6, 2.4))
     assert math.isnan(graded().bias)
@@ -137,9 +192,28 @@ def test_the_stated_evidence_is_there() -> None:
     assert {one.name for one in QUANTITIES} <= named, "every measured quantity of cubes counts, met or not"
 
 
+def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
+    """From the least to the greatest of the shipped cases in the table of that page; the stress of the one case in its text."""
+    text = (HOME / "docs" / "error_bars.md").read_text(encoding="utf-8")
+    table = text.partition("## The shipped cases\n")[2].partition("\n## ")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if line[:1] == "|"]
+    head, _, *cases = rows
+    assert len(cases) == 7
+    stated = {one.name: one.bar for one in claims()}
+    columns = {"Volume": "volume", "Fibre length": "fibre length, rms", "Surface": "surface, rms"}
+    for name, column in columns.items():
+        bars = sorted((row[head.index(column)].removeprefix("± ").split()[0] for row in cases), key=float)
+        assert stated[name].startswith(f"{bars[0]} to {bars[-1]} "), name
+    bar, value, where = re.fullmatch(r"(\S+) of (\S+) kPa in the mean \((\w+)\)", stated["Stress"]).groups()
+    (said,) = [line for line in text.splitlines() if "kPa in the mean" in line]
+    assert f"{value} ± {bar} kPa in the mean" in said
+    assert f"`{where}`" in said
+    assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {"by --error-bar, by case"}
+
+
 def test_parameters_are_inside_only_where_all_ranges_say_so() -> None:
     def inside(*parameters) -> bool | None:
-        return Fitted("law", {str(i): one for i, one in enumerate(parameters)}, {}, ()).inside
+        return Fitted("law", {str(i): one for i, one in enumerate(parameters)}, {}, (), True, 1).inside
 
     assert inside((1.0, (0.5, 2.0)), (9.0, None)) is True
     assert inside((1.0, (0.5, 2.0)), (9.0, (1.0, 2.0))) is False

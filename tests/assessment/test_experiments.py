@@ -16,6 +16,15 @@ def test_every_measured_number_belongs_to_an_experiment_with_a_record() -> None:
     assert {one.experiment for one in facts()} == set(experiments.experiments())
 
 
+def test_models_are_told_from_measurements() -> None:
+    """Those of whose specimen the record says "a model"; the bands are numbers of several publications."""
+    kinds = {name: one.kind for name, one in experiments.experiments().items()}
+    assert {name for name, kind in kinds.items() if kind == "model"} == {"blemker_delp_2005", "modenese_kohout_2020"}
+    assert {name for name, kind in kinds.items() if kind == "bands"} == {"scale"}
+    for name, one in experiments.experiments().items():
+        assert ("a model" in one.specimen) == (one.kind == "model"), name
+
+
 def test_conditions_are_not_written_twice() -> None:
     keys = [(one.experiment, one.quantity, one.condition) for one in facts()]
     assert len(set(keys)) == len(keys)

@@ -75,12 +75,13 @@ def test_bias_and_scatter_are_of_the_mean_arm_from_the_middle() -> None:
     found = range_of(at, arms)
     assert (found.low.tolist(), found.high.tolist()) == ([10, 12], [30, 40])
     names = ("case", "muscle", "flexion", "someone", "coarse")
-    beside = ArmsBeside(*names, found, arms.mean(axis=1), flat(at, 10, 20), 0.0)
+    beside = ArmsBeside(*names, found, arms.mean(axis=1), flat(at, 10, 20), 0.0, "model")
     assert (beside.bias, beside.scatter, beside.is_curve) == (8.0, 3.0, False)  # 20 - 15 and 26 - 15
-    lost = ArmsBeside(*names, found, np.array([20.0, np.nan]), flat(at, 10, 20), 0.0)
+    lost = ArmsBeside(*names, found, np.array([20.0, np.nan]), flat(at, 10, 20), 0.0, "model")
     assert np.isnan(lost.bias), "an arm of ours that is not a number is no pose to leave out"
     partly = ArmRange(at, np.array([10.0, np.nan]), np.array([20.0, np.nan]))
-    assert ArmsBeside(*names, found, arms.mean(axis=1), partly, 0.0).bias == 5.0
-    assert np.isnan(ArmsBeside(*names, found, arms.mean(axis=1), flat(at, np.nan, np.nan), 0.0).bias)
-    curve = ArmsBeside(*names, found, arms.mean(axis=1), flat(at, 11, 11), 0.0)
+    assert ArmsBeside(*names, found, arms.mean(axis=1), partly, 0.0, "model").bias == 5.0
+    assert ArmsBeside(*names, found, arms.mean(axis=1), partly, 0.0, "model").known == 1
+    assert np.isnan(ArmsBeside(*names, found, arms.mean(axis=1), flat(at, np.nan, np.nan), 0.0, "model").bias)
+    curve = ArmsBeside(*names, found, arms.mean(axis=1), flat(at, 11, 11), 0.0, "measurement")
     assert (curve.is_curve, curve.share) == (True, 0.5)

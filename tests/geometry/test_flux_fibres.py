@@ -1,5 +1,7 @@
 """Fibres by area: a flow of closed form, its lines, and their evenness at both ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapes
@@ -132,6 +134,18 @@ def test_the_other_way_round_lines_run_the_other_way() -> None:
     for line in each(streamlines(area_flux(SHEET, "end", "bottom"), 5)):
         assert line[0, 0] == pytest.approx(LENGTH, abs=1e-9)
         assert line[-1, 2] == pytest.approx(0, abs=1e-9)
+
+
+def test_lines_that_leave_beside_the_end_do_not_count() -> None:
+    """A flow that goes aside by 1 mm in 10: of a bar 10 mm wide and 50 mm long, the half that starts at x < 5 comes to the top."""
+    straight = area_flux(bar(), "bottom", "top")
+    aside = replace(straight, slopes=np.broadcast_to([0.001, 0, 0.01], straight.slopes.shape))
+    lines = each(streamlines(aside, 20))
+    assert_allclose(lines[:, -1, 2], 50, atol=1e-9)
+    assert lines[:, 0, 0].max() < 5
+    beside = replace(straight, slopes=np.broadcast_to([0.01, 0, 0.01], straight.slopes.shape))
+    with pytest.raises(InputError, match="got 4, want at most 0, the fibres that could be traced"):
+        streamlines(beside, 4)
 
 
 def test_too_many() -> None:

@@ -271,7 +271,7 @@ def test_given_fibres_are_read_and_completed(bar) -> None:
             case = casefile.read_muscle(bar, {"fibres.complete": complete})
             built = muscle.build(case, muscle.setup(case))
             assert built.fibres.lengths() == pytest.approx([length], rel=1e-6)
-            assert built.mesh_facts["fibre_ends_beyond_2_mm"] == beside
+            assert built.mesh_facts["fibre_ends_beside"] == beside
     finally:
         (bar / "case.toml").write_text(text)
 
@@ -349,7 +349,7 @@ def test_every_fibre_of_every_shipped_muscle_reaches_its_attachment_or_is_named(
     case = casefile.read_muscle(name, {"muscle.refinements": 0})
     facts = muscle.build(case, muscle.setup(case)).mesh_facts
     named = str(facts.get("fibre_ends_not_attached", "")).count("of fibre")
-    assert named == facts["fibre_ends_beyond_2_mm"] == (7 if name == "gluteus_maximus" else 0)
+    assert named == facts["fibre_ends_beside"] == (7 if name == "gluteus_maximus" else 0)
     assert facts.get("fibre_ends_by_tendon", 0) == (5 if name == "gluteus_maximus_anatomical" else 0)
 
 

@@ -52,7 +52,7 @@ def test_distances_are_to_the_attached_area_and_not_to_its_vertices() -> None:
     assert found.named(1, 1) == "last end of fibre 1, of top"
     assert found.facts == {
         "fibre_ends": 4.0,
-        "fibre_ends_beyond_2_mm": 1.0,
+        "fibre_ends_beside": 1.0,
         "fibre_end_farthest_mm": 5.0,
         "fibre_ends_not_attached": "last end of fibre 1, of top: 5.0 mm",
     }
@@ -100,7 +100,7 @@ def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
     found = ends_of_setup(with_tendon([14, 9, 50]), given)
     assert found is not None
     assert not found.beside.any()
-    assert (found.facts["fibre_ends_beyond_2_mm"], found.facts["fibre_ends_by_tendon"]) == (0, 1)
+    assert (found.facts["fibre_ends_beside"], found.facts["fibre_ends_by_tendon"]) == (0, 1)
     assert_allclose(found.beyond(ends_of(given), 0), [0, 5], rtol=1e-12)
     moved = ends_of(given) + [0, 0, 1]
     assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)

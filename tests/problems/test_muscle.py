@@ -227,7 +227,7 @@ def test_mesh_facts_say_who_made_it_and_how_good_it_is(built) -> None:
     assert facts["tets"] == len(built.mesh.tets)
     assert 0 < facts["quality_min"] <= facts["quality_5_percent"] <= 1
     assert facts["fibre_ends"] == 2 * len(built.fibres.lengths())
-    assert facts["fibre_ends_beyond_2_mm"] == 0
+    assert facts["fibre_ends_beside"] == 0
     body = small.body()  # coarsening keeps the enclosed volume
     assert facts["volume_mm3"] == pytest.approx(enclosed_volume(body.points, body.triangles), rel=1e-3)
 

@@ -2,11 +2,15 @@
 
 import html
 import json
+from dataclasses import replace
+
+import numpy as np
 
 from fem_reference import report
 from fem_reference.assessment.experiments import experiments
+from fem_reference.assessment.moment_arms import ArmRange
 from fem_reference.report import credibility_page
-from tests.assessment.test_credibility import found
+from tests.assessment.test_credibility import arms, found
 
 
 def test_the_page_and_its_numbers(tmp_path) -> None:
@@ -28,8 +32,26 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
 
 
 def test_what_it_says_in_a_line() -> None:
-    said = credibility_page.said(found())
-    assert said == "4 quantities: 1 validated, 1 indicative, 1 outside, 1 verified only; 5 of 6 comparisons within"
+    """Measurements apart from other models."""
+    said = "4 quantities: 1 validated, 1 indicative, 1 outside, 1 verified only; 5 of 6 measurements within their uncertainty, "
+    assert credibility_page.said(found()) == said + "0 of 1 other models as near as asked for"
+
+
+def test_measurements_and_other_models_are_counted_apart(tmp_path) -> None:
+    page = credibility_page.page(found())
+    row = credibility_page.facts(found())["rows"][2]
+    assert (row["measurement"], row["model"]) == ({"met": 2, "of": 3}, {"met": 0, "of": 1})
+    assert [one["kind"] for one in row["beside"]] == ["measurement"] * 3 + ["model"]
+    text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text())
+    assert "2 of 3 measurements within; 0 of 1 other models as near as asked for" in text
+    assert "converged in 9 evaluations from one start" in text
+
+
+def test_poses_are_those_in_which_the_published_arm_is_known() -> None:
+    made = arms(10, 20, (15, 15))
+    published = np.where(made.found.angles < 6, 15.0, np.nan)
+    partly = replace(made, published=ArmRange(made.found.angles, published, published))
+    assert [one["poses"] for one in credibility_page.facts(replace(found(), arms=(made, partly)))["arms"]] == [10, 3]
 
 
 def test_a_fit_is_met_by_the_same_uncertainty_and_unknown_without_a_value() -> None:

@@ -17,6 +17,18 @@ def test_the_fitted_shear_modulus_is_near_that_of_linear_elasticity() -> None:
     assert found.inside is False
     assert set(found.to) < set(found.values) == {one.name for one in QUANTITIES}
     assert not [name for name in found.to if "strip" in name or "confinement" in name]
+    assert found.converged
+
+
+def test_a_fit_that_runs_out_of_evaluations_says_so() -> None:
+    found = collagen_law(1)
+    assert (found.converged, found.evaluations) == (False, 1)
+
+
+def test_a_number_is_never_taken_for_an_order() -> None:
+    """Every quantity but orders is fitted, whatever its truth and its uncertainty."""
+    assert {one.name for one in QUANTITIES if one.is_order} == {"cube_softest_midway", "cube_stiffest_across"}
+    assert set(collagen_law(1).to) == {one.name for one in QUANTITIES if not one.is_order}
 
 
 @pytest.mark.slow
@@ -26,4 +38,5 @@ def test_collagen_meets_more_than_the_shipped_law_can() -> None:
 
     found = collagen_law()
     assert found.inside is None
+    assert found.converged
     assert misses(found.values) < misses(shipped_law().values) / 5
