@@ -62,10 +62,8 @@ class ContactForces:
         """``frame``: at which the body is at rest."""
         self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
-        patches = Patches(points)
-        reach = law.smoothing + (law.in_situ or 0.0)
-        self.nearby = [Nearby(entry.shape, reach, patches) for entry in bones]
         self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
+        self.look()
         self.update(frame)
         self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # at rest, at most
         if law.relaxed:
@@ -73,6 +71,12 @@ class ContactForces:
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
             self.update(frame)
         self.settle()
+
+    def look(self) -> None:
+        """Look for points as far from each bone as it is felt with the overlaps at rest, or supports them there."""
+        patches, support = Patches(self.points), self.law.in_situ or 0.0
+        reach = [self.law.smoothing + max(support, float(-one.min(initial=0.0))) for one in self.overlaps]
+        self.nearby = [Nearby(bone.shape, far, patches) for bone, far in zip(self.bones, reach, strict=True)]
 
     def update(self, frame: float) -> None:
         """Find the pressures at the present unknowns, with the bones at their poses of ``frame``."""

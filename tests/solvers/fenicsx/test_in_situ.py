@@ -143,6 +143,20 @@ def test_the_smoothing_does_not_change_what_supports_at_rest(session) -> None:
     assert other.forces["ball"] == pytest.approx(one.forces["ball"], abs=1e-6)
 
 
+@pytest.mark.parametrize("smoothing", [0.02, 0.2])
+def test_a_bone_that_goes_away_presses_until_its_pressure_is_gone(session, smoothing) -> None:
+    """The pressure at rest over the stiffness is 1 mm, so it is felt 0.5 mm farther away, beyond support and smoothing; the law
+    is linear there, whatever the smoothing. The muscle follows, so that more is left than of a muscle that does not.
+    """
+    body = supported(0.7, 0.5, smoothing=smoothing)
+    ball = replace(body.bones[0], pose=Slide((0.5, 0.0, 0.0)))
+    run = solved(session, replace(body, bones=(ball,), contact=replace(body.contact, stiffness=0.02)))
+    rest, last = (state.scalars["contact_pressure"] for state in (run.states[0], run.last))
+    assert rest > 0.02
+    assert rest - 0.02 * 0.5 < last < rest
+    assert run.last.scalars["contact_points"] == 10
+
+
 def test_a_bone_presses_more_on_a_muscle_that_is_pulled_and_less_on_a_slack_one(session) -> None:
     slack, rest, taut = (-solved(session, supported(1.0, 0.5, pull=pull)).last.forces["ball"][0] for pull in (-3, 0, 1))
     assert 1.2 * slack < rest < taut / 1.1
