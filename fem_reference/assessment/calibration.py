@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from fem_reference.assessment.judge import in_unit
-from fem_reference.assessment.uncertainty import Parameter
+from fem_reference.assessment.uncertainty import Failure, Parameter
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files
@@ -26,8 +26,14 @@ _CORRELATED = 0.95
 # A combination of parameters is not determined at all where its singular value is below this share of the greatest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# The values (m,) that runs have where the data have theirs, for each of several points (d,) from 0 to 1 of the ranges.
-Forward = Callable[[Sequence[Floats]], Sequence[Floats]]
+# The values (m,) that runs have where the data have theirs, for each of several points (d,) from 0 to 1 of the ranges; None for a
+# point without an answer.
+Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
+# The most points that are asked, by parameter, besides differences.
+_MOST = 50
+# Scatter beyond this, in standard deviations of the data, is not theirs.
+FOLLOWED = 2.0
+_ENDED = "a run that the fit needs has no answer"
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,8 @@ class Calibration:
     """Fitted ``estimates`` of a case. ``scatter``: root mean square of what is left, by degree of freedom, in standard deviations
     of the data: near 1 where law and data agree. ``singular``: values of the matrix of sensitivities, in standard deviations by
     range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: how many points were asked.
+    ``failures``: those of them without an answer; ``ended``: why the fit could not go on, and so has no intervals, else empty;
+    ``converged``: True where no step leads nearer to the measurements.
     """
 
     case: str
@@ -77,6 +85,19 @@ class Calibration:
     singular: tuple[float, ...]
     pairs: tuple[tuple[str, str, float], ...]
     runs: int
+    converged: bool = False
+    failures: tuple[Failure, ...] = ()
+    ended: str = ""
+
+    @property
+    def is_followed(self) -> bool:
+        """True where the law follows the data, as far as these scatter."""
+        return self.scatter <= FOLLOWED
+
+    @property
+    def holds(self) -> bool:
+        """True where the fit has converged, the law follows the data, and all estimates are known within their ranges."""
+        return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
 def read(path: Path, units: Callable[[str, str], str]) -> tuple[Measurement, ...]:
@@ -107,32 +128,76 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measu
     return Measurement(int(frame), quantity, numbers[0], own, numbers[1], place)
 
 
+class _NoAnswerError(Exception):
+    """A point without an answer, where the fit cannot go on without one."""
+
+
+class _Residuals:
+    """Differences between runs and measurements, in standard deviations, at points that are asked once each."""
+
+    def __init__(self, forward: Forward, rows: Sequence[Measurement]) -> None:
+        self.forward, self.known = forward, dict[bytes, Floats]()
+        self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
+
+    def at(self, points: Sequence[Floats]) -> list[Floats]:
+        """The residuals (m,) at each point, infinite where it has no answer."""
+        asked = [point for point in points if point.tobytes() not in self.known]
+        for point, found in zip(asked, self.forward(asked), strict=True):
+            lost = np.full(len(self.values), np.inf)
+            left = lost if found is None else _finite((found - self.values) / self.deviations)
+            self.known[point.tobytes()] = left
+        return [self.known[point.tobytes()] for point in points]
+
+    def slopes(self, point: Floats, *_: Any) -> Floats:
+        """Differences (m, d) by steps into the range."""
+        steps = np.where(point < 0.5, _STEP, -_STEP)
+        at, *moved = self.at([point, *(point + np.diag(steps))])
+        if not np.isfinite([at, *moved]).all():
+            raise _NoAnswerError
+        return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
+
+    def best(self) -> tuple[Floats, Floats] | None:
+        """The point with the least residuals so far, and these; None without any."""
+        points = [(np.frombuffer(key), left) for key, left in self.known.items() if np.isfinite(left).all()]
+        return min(points, key=lambda one: float(one[1] @ one[1])) if points else None
+
+
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
     """The parameters within their ranges whose values by ``forward`` are nearest to the measurements, in their standard deviations;
-    from the case's own values on. InputError where there are no more measurements than parameters.
+    from the case's own values on. A point without an answer is stepped back from; at the start, or beside a point whose
+    sensitivities are asked, the fit ends there and says so. InputError where there are no more measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
-    values, deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
-    known = dict[bytes, Floats]()
-
-    def residuals(points: Sequence[Floats]) -> list[Floats]:
-        asked = [point for point in points if point.tobytes() not in known]
-        for point, found in zip(asked, forward(asked), strict=True):
-            known[point.tobytes()] = _finite((found - values) / deviations)
-        return [known[point.tobytes()] for point in points]
-
-    def slopes(point: Floats, *_: Any) -> Floats:
-        """Differences by steps into the range."""
-        steps = np.where(point < 0.5, _STEP, -_STEP)
-        at, *moved = residuals([point, *(point + np.diag(steps))])
-        return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
-
+    residuals = _Residuals(forward, rows)
     start = np.array([min(max(one.place(one.nominal), 0.01), 0.99) for one in parameters])
-    found = least_squares(lambda point: residuals([point])[0], start, slopes, bounds=(0, 1), xtol=1e-5, ftol=1e-8)
-    result = _judged(found.x, np.asarray(found.fun), slopes(found.x), parameters)
-    fitted = tuple(map(float, values + deviations * found.fun))
-    return replace(result, case=case, rows=tuple(rows), fitted=fitted, runs=len(known))
+    try:
+        residuals.slopes(start)  # without an answer there nothing can begin
+        found = least_squares(
+            lambda point: residuals.at([point])[0],
+            start,
+            residuals.slopes,
+            bounds=(0, 1),
+            xtol=1e-5,
+            ftol=1e-8,
+            max_nfev=_MOST * len(parameters),
+        )
+        left = np.asarray(found.fun)
+        result = replace(_judged(found.x, left, residuals.slopes(found.x), parameters), converged=bool(found.success))
+    except _NoAnswerError:
+        result, left = _ended(residuals, parameters)
+    fitted = tuple(map(float, residuals.values + residuals.deviations * left))
+    return replace(result, case=case, rows=tuple(rows), fitted=fitted, runs=len(residuals.known))
+
+
+def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
+    """The best point of a fit that could not go on, without intervals; and what is left there, NaN without any."""
+    best, freedom = residuals.best(), len(residuals.values) - len(parameters)
+    left = np.full(len(residuals.values), np.nan) if best is None else best[1]
+    known = () if best is None else zip(parameters, best[0], strict=True)
+    estimates = tuple(_estimate(one, float(at), math.inf) for one, at in known)
+    scatter = float(np.sqrt(left @ left / freedom))
+    return Calibration("", estimates, (), (), scatter, (), (), 0, ended=_ENDED), left
 
 
 def _finite(residuals: Floats) -> Floats:
@@ -184,6 +249,7 @@ def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter])
 def facts(found: Calibration) -> dict[str, Any]:
     """A calibration as valid JSON."""
     table: dict[str, Any] = plain(asdict(found))
+    table |= {"is_followed": found.is_followed, "holds": found.holds}
     for one, row in zip(found.estimates, table["estimates"], strict=True):
         row["is_known"] = one.is_known
     return table

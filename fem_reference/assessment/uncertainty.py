@@ -140,7 +140,7 @@ class Placed:
 class Uncertainty:
     """The bands of a case from so many ``runs`` of a design with a ``seed``, of which some are ``failures``; ``fixed``: titles of
     the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: by candidate, why it has no run; ``seconds``:
-    processor time of a run, on the mean.
+    processor time of a run, on the mean; ``refused``: why there are no runs, as the case itself has no solution, else empty.
     """
 
     case: str
@@ -156,6 +156,7 @@ class Uncertainty:
     lost: dict[str, str] = field(default_factory=dict)
     seconds: float = math.nan
     origin: dict[str, str] = field(default_factory=dict)
+    refused: str = ""
 
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:

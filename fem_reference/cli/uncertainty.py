@@ -36,4 +36,4 @@ def run(options: argparse.Namespace) -> int:
     more += [Part(("--seed", str(options.seed)), f"seed{options.seed}")] if options.seed != 1 else []
     wanted = asked("uncertainty", scene, options, "uncertainty", *more)
     publish(options, wanted, uncertainty_page.page(found), facts(found), uncertainty_page.text(found))
-    return SOLVER_FAILED if any(band.refused for band in found.bands) else DONE
+    return SOLVER_FAILED if found.refused or any(band.refused for band in found.bands) else DONE

@@ -1,10 +1,11 @@
 """A calibration as lines of text: the estimates with their intervals, and what the measurements do not determine."""
 
-from fem_reference.assessment.calibration import CONFIDENCE, Calibration, Estimate
+from fem_reference.assessment.calibration import CONFIDENCE, FOLLOWED, Calibration, Estimate
+from fem_reference.assessment.uncertainty import Failure
 from fem_reference.report.words import number
 
-# Scatter beyond these, in standard deviations of the data, is remarked.
-_LITTLE, _MUCH = 0.5, 2.0
+# Scatter below this, in standard deviations of the data, is remarked.
+_LITTLE = 0.5
 
 
 def text(found: Calibration) -> str:
@@ -12,6 +13,13 @@ def text(found: Calibration) -> str:
     lines = [
         f"{found.case}: {len(found.estimates)} parameters from {len(found.rows)} measurements, {found.runs} runs asked"
     ]
+    lines += [f"  no answer: {one.status}: {one.message} ({_values(one)})" for one in found.failures]
+    if found.ended:
+        lines.append(f"  no fit: {found.ended}{'; the best point so far:' if found.estimates else ''}")
+        best = [f"  {one.parameter.title}: {one.value:.5g} {one.parameter.unit}".rstrip() for one in found.estimates]
+        return "\n".join([*lines, *best])
+    if not found.converged:
+        lines.append("  not converged: a step could still lead nearer to the measurements")
     lines += [_line(one) for one in found.estimates]
     lines.append(
         f"  what is left scatters by {number(found.scatter)} of the standard deviations of the data{_remark(found.scatter)}"
@@ -22,6 +30,10 @@ def text(found: Calibration) -> str:
     ]
     values = ", ".join(number(one) for one in found.singular)
     return "\n".join([*lines, f"  singular values of the sensitivities: {values}"])
+
+
+def _values(one: Failure) -> str:
+    return ", ".join(f"{key} = {value:g}" for key, value in one.values.items())
 
 
 def _line(one: Estimate) -> str:
@@ -38,6 +50,6 @@ def _line(one: Estimate) -> str:
 
 def _remark(scatter: float) -> str:
     """The meaning of a scatter that is far from 1."""
-    if scatter > _MUCH:
+    if scatter > FOLLOWED:
         return ": the law does not follow the data"
     return ": the data scatter less than they say" if scatter < _LITTLE else ""

@@ -39,6 +39,8 @@ def page(found: Uncertainty) -> Page:
 
 def sentences(found: Uncertainty) -> list[str]:
     """The result in sentences: the band of the surface beside the bar of the reference, its cause, and where the candidates are."""
+    if found.refused:
+        return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
     places = {
         one.candidate: one.word for one in found.placed if found.bands and one.quantity == found.bands[0].quantity
@@ -62,8 +64,8 @@ def _sentence(found: Uncertainty, band: Band) -> str:
     cause = {one.key: one.title for one in found.parameters}.get(most, "")
     why = f" Most of it is by {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
     return (
-        f"In 95 of 100 cases with other parameters in their ranges the surface is within {number(band.width)} {band.unit} of this "
-        f"case's, rms{known}.{why}"
+        f"In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within {number(band.width)} "
+        f"{band.unit} of this case's, rms{known}.{why}"
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect, Load, Ramped, in_situ, moduli
+from fem_reference.effects import Effect, FieldEffect, Load, Ramped, in_situ, moduli, name_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -173,6 +173,17 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     _check_once(runs, join(place, "candidate"))
     _check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
+    return _checked(case)
+
+
+def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
+    """The ``case`` with other numbers by key, in their units inside, checked as one of a file."""
+    made = numbers.changed(case, values)
+    _check_effects([name_of(one) for one in made.effect], made.effect, made.place)
+    return _checked(made)
+
+
+def _checked[C: Case](case: C) -> C:
     if isinstance(case, MuscleCase):
         _check_names(case)
         _check_rest(case)
@@ -281,9 +292,8 @@ def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, p
         if isinstance(effect, Contact):
             _check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
             if effect.support is not None and in_situ.among(acting) is None:
-                raise InputError(
-                    join(place, f"effect[{i}].support"), f"{effect.support:g} mm", 'it beside "in_situ" only'
-                )
+                got = f"{effect.support:g} mm"
+                raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
             raise InputError(join(place, "frames.interval"), "nothing", want)

@@ -7,8 +7,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from fem_reference.effects import Effect, name_of
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record, join
-from fem_reference.foundations.units import field_unit, written
+from fem_reference.foundations.records import Record, join, parse
+from fem_reference.foundations.units import LENGTH_UNITS, field_unit, kinds, length_unit, written
 from fem_reference.scenes.case import Case
 
 
@@ -20,6 +20,15 @@ def parts(key: str) -> list[str | int]:
     """
     found = re.findall(r"[^.\[\]]+", key) or [""]
     return [int(part) if part.isdecimal() and len(part) < 10 else part for part in found]
+
+
+def canonical(key: str) -> str:
+    """The one way to write a ``key``.
+
+    >>> canonical("effect.0.mu"), canonical("effect[00].ramp[1].amount")
+    ('effect[0].mu', 'effect[0].ramp[1].amount')
+    """
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts(key)).lstrip(".")
 
 
 def number(case: Case, key: str) -> float:
@@ -50,16 +59,36 @@ def read(case: Case, key: str, value: str | float) -> float:
 
 
 def changed[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their units inside, each checked as in a scene file."""
+    """The ``case`` with other numbers by key, in their units inside; each, and each record that it is in, is checked as in a scene
+    file. Checks of records beside each other follow in :func:`fem_reference.scenes.casefile.with_numbers`.
+    """
     for key, value in values.items():
         found: Any = read(case, key, value)
-        for inside, part in zip(reversed(_along(case, key)[:-1]), reversed(parts(key)), strict=True):
+        names = parts(key)
+        for i in reversed(range(len(names))):
+            inside, part = _along(case, key)[i], names[i]
             if isinstance(part, int):
                 found = (*inside[:part], found, *inside[part + 1 :])
             else:
-                found = inside.model_copy(update={part: found})
+                found = _with(inside, part, found, join(case.place, canonical(".".join(map(str, names[:i])))))
         case = found
     return case
+
+
+def _with(record: Record, name: str, value: Any, place: str) -> Record:
+    """A ``record`` with another value, read again as from a file."""
+    fields = type(record).model_fields
+    stated = {one: getattr(record, one) for one in fields if one in record.model_fields_set} | {name: value}
+    table = {fields[one].alias or one: _in_file(fields[one], inside) for one, inside in stated.items()}
+    return parse(type(record), table, place)
+
+
+def _in_file(field: Any, value: Any) -> Any:
+    """A ``value`` of a field as files write it."""
+    readers = [one for kind in kinds(field.annotation) for one in getattr(kind, "__metadata__", ())]
+    if any(getattr(one, "func", None) is length_unit for one in (*field.metadata, *readers)):
+        return next((unit for unit, length in LENGTH_UNITS.items() if length == value), value)
+    return written(value, field_unit(field))
 
 
 def title(case: Case, key: str) -> str:

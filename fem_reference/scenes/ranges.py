@@ -6,13 +6,18 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
+# Runs with other fibres, bones or frames would be measured with those of the case.
+_VARIED = "a number of an effect, or the stiffness of an attachment: the fibres, bones and frames of all runs are those of the case"
+
 
 def ranges(case: MuscleCase) -> dict[str, Range]:
     """The ranges by key: the published ones of the parameters of its effects, and in their place or beside them its own."""
     stated = {
         f"effect[{i}].{name}": one for i, effect in enumerate(case.effects) for name, one in effect.published.items()
     }
-    return stated | {entry.key: Range(**entry.model_dump(exclude={"key"})) for entry in case.uncertain}
+    return stated | {
+        numbers.canonical(entry.key): Range(**entry.model_dump(exclude={"key"})) for entry in case.uncertain
+    }
 
 
 def left_out(case: MuscleCase) -> list[str]:
@@ -40,6 +45,10 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
         raise InputError(f"{place}.high", f'"{one.high}"', f'more than low, "{one.low}"')
     if one.spread == "log-uniform" and not low > 0:
         raise InputError(f"{place}.low", f'"{one.low}"', "more than zero: its logarithm is spread")
+    if one.spread == "log-uniform" and not (own := numbers.number(case, key)) > 0:
+        raise InputError(
+            f"{place}.spread", f'"log-uniform" of {own:g}', '"uniform", as this has no logarithm in the case'
+        )
     return low, high
 
 
@@ -48,11 +57,15 @@ def check(case: MuscleCase) -> None:
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")
-        if entry.key in keys:
+        key = numbers.canonical(entry.key)
+        if key in keys:
             raise InputError(f"{place}.key", f'"{entry.key}" a second time', "every key once")
-        keys.append(entry.key)
+        keys.append(key)
         try:
             numbers.number(case, entry.key)
         except InputError as error:
             raise InputError(f"{place}.key", f'"{entry.key}"', error.want) from error
+        inside = numbers.parts(key)
+        if inside[0] != "effect" and not (inside[0] == "attachment" and inside[2:] == ["stiffness"]):
+            raise InputError(f"{place}.key", f'"{entry.key}"', _VARIED)
         ends(case, entry.key, entry, place)

@@ -1,23 +1,23 @@
 """Fits the parameters of a case to measured forces, lengths and places, by runs of its reference."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fem_reference.assessment import calibration
 from fem_reference.assessment.calibration import Calibration, Measurement
-from fem_reference.assessment.uncertainty import Parameter
+from fem_reference.assessment.uncertainty import Failure, Parameter
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, change, context_of, find, units
-from fem_reference.problems import of_case
 from fem_reference.runs.store import Run
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.campaign import Workers, carry_out, shared_bench
-from fem_reference.studies.uncertainty import parameters_of
+from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
 
 _AXES = ("x", "y", "z")
@@ -26,33 +26,39 @@ _WANT = "METRIC.STATISTIC, force.BONE, force.BONE.x, or position.VERTEX.x"
 
 def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, workers: Workers) -> Calibration:
     """The numbers of a case at ``keys``, within their ranges, fitted to the measurements in a CSV file by runs of the reference."""
-    case = of_case.chosen(case).model_copy(update={"choice": "listed", "decisions": (), "candidate": ()})
-    parameters = chosen(case, keys)
+    varied = unknowns(case.model_copy(update={"candidate": ()}))
+    case, parameters, lost = varied.case, chosen(varied, keys), list[Failure]()
     rows = calibration.read(data, lambda quantity, place: unit_of(case, quantity, place))
     for row in rows:
         if row.frame not in case.numbers:
             want = f"one of the case: {case.numbers[0]} to {case.numbers[-1]}, every {case.frames.every}"
             raise InputError(f"{row.place}: frame", str(row.frame), want)
 
-    def forward(points: Sequence[Floats]) -> list[Floats]:
+    def forward(points: Sequence[Floats]) -> list[Floats | None]:
         values = [{one.key: one.at(float(at)) for one, at in zip(parameters, point, strict=True)} for point in points]
-        return [_asked(case, run, rows, store) for run in _runs(case, values, store, workers)]
+        made = _made(varied, values, store, workers)
+        lost.extend(one for one in made if isinstance(one, Failure))
+        return [None if isinstance(one, Failure) else _asked(case, one, rows, store) for one in made]
 
     with fenicsx.shared():
-        return calibration.fit(forward, parameters, rows, case.name)
+        found = calibration.fit(forward, parameters, rows, case.name)
+    return replace(found, failures=tuple(lost))
 
 
-def chosen(case: MuscleCase, keys: Sequence[str]) -> tuple[Parameter, ...]:
-    """The parameters at ``keys``, each with a range; InputError where one has none."""
-    known = {one.key: one for one in parameters_of(case)}
+def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
+    """The parameters at ``keys``, each with a range; InputError where one has none, or is of an effect that the case leaves out."""
+    known = {one.key: one for one in varied.parameters()}
     for key in keys:
-        numbers.number(case, key)
-        if key not in known:
+        numbers.number(varied.whole, key)
+        if not varied.acts(key):
+            got = f'"{key}", of {numbers.title(varied.whole, key)}, which this case leaves out'
+            raise InputError("--fit", got, f'one of {", ".join(known)}, or effects = "listed"')
+        if numbers.canonical(key) not in known:
             want = f"a key with a range ({', '.join(known)}), or one in [[uncertain]] of the case"
             raise InputError("--fit", f'"{key}", which has no range', want)
     if not keys:
         raise InputError("--fit", "nothing", f"one of {', '.join(known)}")
-    return tuple(known[key] for key in dict.fromkeys(keys))
+    return tuple(known[key] for key in dict.fromkeys(map(numbers.canonical, keys)))
 
 
 def unit_of(case: MuscleCase, quantity: str, place: str) -> str:
@@ -83,20 +89,18 @@ def _split(quantity: str) -> tuple[str, str, str]:
     return (kind, name, axis) if name and axis in _AXES else (kind, rest, "")
 
 
-def _runs(case: MuscleCase, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run]:
-    """The runs of the case with other ``values`` by key; InputError where one does not reach all frames."""
-    said = [", ".join(f"{key} {value:.6g}" for key, value in one.items()) for one in values]
-    trials = [
-        Trial(numbers.changed(case, one), case.reference, "reference", "fit", words)
-        for one, words in zip(values, said, strict=True)
-    ]
-    runs = list[Run]()
-    for made in carry_out(trials, store, workers):
-        if made.reached is None:
-            got = f"a run that {': '.join(made.ended)} (at {made.trial.value})"
-            raise InputError("calibrate", got, "ranges of parameters in which the reference reaches all frames")
-        runs.append(made.reached)
-    return runs
+def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run | Failure]:
+    """The runs of the case with other ``values`` by key, or why one has no answer."""
+    found, trials = dict[int, Run | Failure](), dict[int, Trial]()
+    for i, one in enumerate(values):
+        said = ", ".join(f"{key} {value:.6g}" for key, value in one.items())
+        try:
+            trials[i] = Trial(varied.at(one), varied.whole.reference, "reference", "fit", said)
+        except InputError as error:
+            found[i] = Failure(one, "refused", str(error))
+    for i, made in zip(trials, carry_out(list(trials.values()), store, workers), strict=True):
+        found[i] = made.reached or Failure(values[i], *made.ended)
+    return [found[i] for i in range(len(values))]
 
 
 def _asked(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path) -> Floats:

@@ -11,18 +11,15 @@ from fem_reference.assessment import bands
 from fem_reference.assessment.bands import Design, sampled
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.uncertainty import Band, Failure, Parameter, Uncertainty, place
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import join
 from fem_reference.metrics import MeasurementContext, change, described, find
-from fem_reference.problems import of_case
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run, complete
-from fem_reference.scenes import numbers, ranges
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import judging, refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
+from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
@@ -34,64 +31,53 @@ FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """The bands of a case from so many ``runs`` of its reference; InputError where no parameter has a range, or the case itself has
-    no solution.
+    """The bands of a case from so many ``runs`` of its reference, none where the case itself has no solution; InputError where no
+    parameter has a range.
     """
-    case = of_case.chosen(case).model_copy(update={"choice": "listed", "decisions": ()})  # the same effects in all runs
-    parameters = parameters_of(case)
+    varied = unknowns(case)
+    case, parameters = varied.case, varied.parameters()
     points = sampled(len(parameters), runs, seed)
-    trials = [_trial(case, parameters, point) for point in points]
+    trials = [_trial(varied, parameters, point) for point in points]
+    empty = _none(varied, parameters, seed, made_with(str(workers)))
     with fenicsx.shared():
-        comparison, lost = _nominal(case, store, workers)
+        reference = shared_bench(case, store).reference()
+        if reference.outcome.status != "converged":
+            said = f"the reference {reference.outcome.status}: {reference.outcome.message}"
+            return replace(empty, refused=said)
+        comparison, lost = _nominal(case, reference, store, workers)
         made = carry_out(trials, store, workers)
     answered = [one.reached is not None for one in made]
     design = Design(parameters, points[answered], runs)
     found = tuple(of_runs(comparison, design, [run for one in made if (run := one.reached) is not None]))
     known = [one.run.outcome.cost.get("seconds_processor", np.nan) for one in made if one.run]
-    return Uncertainty(
-        case=case.name,
-        title=case.title,
-        size=case.muscle.tet_size / 2**case.muscle.refinements,
-        parameters=parameters,
-        fixed=tuple(numbers.title(case, key) for key in ranges.left_out(case)),
+    return replace(
+        empty,
         runs=runs,
-        seed=seed,
         failures=tuple(_failure(one, parameters) for one in made if one.reached is None),
         bands=found,
         placed=tuple(place(run.name, band, values) for run, band, values in _beside(comparison, found)),
         lost=lost,
         seconds=float(np.mean(known)) if known else np.nan,
-        origin=made_with(str(workers)),
     )
 
 
-def parameters_of(case: MuscleCase) -> tuple[Parameter, ...]:
-    """The parameters of a case that have a range; InputError where there are none."""
-    found = []
-    for key, one in ranges.ranges(case).items():
-        low, high = ranges.ends(case, key, one, join(case.place, key))
-        named = numbers.title(case, key), numbers.unit(case, key), numbers.number(case, key)
-        found.append(Parameter(key, *named, low, high, one.spread, one.source))
-    if not found:
-        want = 'a range of some number: [[uncertain]] with key, low, high and source, such as key = "effect[0].mu"'
-        raise InputError(join(case.place, "uncertain"), "no parameter with a range", want)
-    return tuple(found)
+def _none(varied: Unknowns, parameters: tuple[Parameter, ...], seed: int, origin: dict[str, str]) -> Uncertainty:
+    """The result of no runs yet."""
+    whole, size = varied.whole, varied.whole.muscle.tet_size / 2**varied.whole.muscle.refinements
+    own = parameters, varied.fixed(), 0, seed, (), ()
+    return Uncertainty(whole.name, whole.title, size, *own, origin=origin)
 
 
-def _trial(case: MuscleCase, parameters: Sequence[Parameter], point: Floats) -> Trial:
+def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> Trial:
     """The run of the reference at a ``point`` (d,) of the design."""
     values = {one.key: one.value(float(at)) for one, at in zip(parameters, point, strict=True)}
     said = ", ".join(f"{one.title} {values[one.key]:.3g} {one.unit}".rstrip() for one in parameters)
-    return Trial(numbers.changed(case, values), case.reference, "reference", "design", said, values)
+    return Trial(varied.at(values), varied.whole.reference, "reference", "design", said, values)
 
 
-def _nominal(case: MuscleCase, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
+def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
     """The case itself with its error bars beside its candidates, and by candidate why it did not reach all frames."""
     bench = shared_bench(case, store)
-    reference = bench.reference()
-    if reference.outcome.status != "converged" or reference.fibres is None:
-        got = f"a reference that {reference.outcome.status}: {reference.outcome.message}"
-        raise InputError(case.place, got, "one that reaches all frames: the band lies around it")
     bars = refinement.bars(bench, reference, model=False)
     made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)
     lost = {one.trial.name: ": ".join(one.ended) for one in made if one.reached is None}

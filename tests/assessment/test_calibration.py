@@ -1,6 +1,8 @@
 """Calibration beside data of known parameters: a fibre at a material point, and what data do not determine."""
 
+import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 from scipy import stats
 
 from fem_reference import effects
-from fem_reference.assessment.calibration import Calibration, Measurement, fit, read
+from fem_reference.assessment.calibration import Calibration, Measurement, facts, fit, read
 from fem_reference.assessment.uncertainty import Parameter
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.material_point import fibre_tension
@@ -108,6 +110,66 @@ def test_a_parameter_at_its_bound_is_said() -> None:
     (one,) = alone.estimates
     assert (one.at, one.value) == ("high", pytest.approx(3.0, rel=1e-3))
     assert alone.scatter > 100
+
+
+def test_a_fit_says_whether_it_holds() -> None:
+    """A straight line does not follow a square, whatever its slope; nor does one hold that is told to stop before its best."""
+    x = np.arange(1.0, 11.0)
+    good, bad = (
+        fit(lambda points: [K1.at(float(p[0])) * x for p in points], (K1,), data(y, 0.1), "k")
+        for y in (1.7 * x, 0.2 * x**2)
+    )
+    assert good.converged
+    assert good.is_followed
+    assert good.holds
+    assert bad.converged
+    assert not bad.is_followed
+    assert not bad.holds
+    assert not replace(good, converged=False).holds
+    assert not replace(good, estimates=(replace(good.estimates[0], at="low"),)).holds
+
+
+def test_a_point_without_an_answer_is_stepped_back_from() -> None:
+    """The springs have no answer from 2.5 N/mm on, as runs that diverge; a fit from 1.01 that jumps there comes back to 2."""
+    x, asked = np.arange(1.0, 11.0), list[float]()
+
+    def halting(points: Sequence[np.ndarray]) -> list[np.ndarray | None]:
+        slopes = [K1.at(float(p[0])) for p in points]
+        asked.extend(slopes)
+        return [None if k > 2.5 else x * k**0.25 for k in slopes]
+
+    soft = replace(K1, nominal=1.0)
+    found = fit(halting, (soft,), data(x * 2**0.25, 1e-3), "k")
+    assert found.ended == ""
+    assert found.holds
+    assert found.estimates[0].value == pytest.approx(2.0, rel=1e-4)
+
+
+def test_a_start_without_an_answer_ends_a_fit_and_nothing_is_claimed() -> None:
+    found = fit(lambda points: [None for _ in points], (K1,), data(np.arange(1.0, 11.0)), "k")
+    assert (found.ended, found.estimates, found.converged) == ("a run that the fit needs has no answer", (), False)
+    assert np.isnan(found.scatter)
+    assert not found.holds
+    assert found.runs == 2
+    json.dumps(facts(found), allow_nan=False)
+
+
+def test_the_best_point_is_kept_where_a_fit_cannot_go_on() -> None:
+    """Answers at the start, beside it, and at the point of the first step: there no sensitivities are known. The step goes most of
+    the way along a line from 1.5 to 1.6.
+    """
+    x, asked = np.arange(1.0, 11.0), list[float]()
+
+    def some(points: Sequence[np.ndarray]) -> list[np.ndarray | None]:
+        asked.extend(float(p[0]) for p in points)
+        return [x * K1.at(float(p[0])) if len(asked) <= 3 else None for p in points]
+
+    found = fit(some, (K1,), data(1.6 * x, 0.1), "k")
+    assert found.ended
+    (one,) = found.estimates
+    assert one.value == pytest.approx(1.6, abs=0.02)
+    assert (one.low, one.high) == (-np.inf, np.inf)
+    assert not one.is_known
 
 
 def test_too_few_rows_are_refused() -> None:

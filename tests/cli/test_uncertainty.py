@@ -38,6 +38,15 @@ def test_a_band_that_is_missing_is_a_failure(tmp_path: Path, monkeypatch: pytest
     assert cli.main(["uncertainty", "hip_flexion", "--out", str(tmp_path)]) == 3
 
 
+def test_a_case_without_a_solution_is_a_failure_with_its_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    none = replace(study(), refused="the reference diverged: frame 40", runs=0)
+    monkeypatch.setattr(uncertainty, "study", lambda *_: none)
+    assert cli.main(["uncertainty", "hip_flexion", "--out", str(tmp_path)]) == 3
+    assert "No band: the reference diverged: frame 40." in capsys.readouterr().out
+
+
 def test_no_runs_at_all_are_bad_input(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match=r"^2$"):
         cli.main(["uncertainty", "hip_flexion", "--runs", "0", "--out", str(tmp_path)])

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from fem_reference.assessment.calibration import Calibration, Estimate, Measurement
-from fem_reference.assessment.uncertainty import Parameter
+from fem_reference.assessment.uncertainty import Failure, Parameter
 from fem_reference.report.calibration_texts import text
 
 MU = Parameter("effect[0].mu", "neo_hooke mu", "MPa", 0.01, 0.004, 0.02, "uniform", "")
@@ -11,7 +11,9 @@ ROW = Measurement(10, "force.lid", 2.0, "N", 0.1, "row 2")
 
 
 def found(scatter: float, *estimates: Estimate) -> Calibration:
-    return Calibration("bar", estimates, (ROW,), (2.0,), scatter, (12.0, 0.5), (("mu", "c1", -0.98),), 7)
+    return Calibration(
+        "bar", estimates, (ROW,), (2.0,), scatter, (12.0, 0.5), (("mu", "c1", -0.98),), 7, converged=True
+    )
 
 
 def test_an_estimate_has_its_interval() -> None:
@@ -33,3 +35,21 @@ def test_what_does_not_count_is_said() -> None:
     )
     assert ": the law does not follow the data" in text(found(3.0, wide))
     assert ": the data scatter less than they say" in text(found(0.1, wide))
+
+
+def test_a_fit_that_could_not_go_on_says_where_and_has_no_intervals() -> None:
+    lost = Failure({"effect[0].mu": 0.019}, "diverged", "frame 40")
+    best = Estimate(MU, 0.011, float("-inf"), float("inf"))
+    ended = replace(found(1.0, best), failures=(lost,), ended="a run that the fit needs has no answer")
+    assert text(ended).splitlines()[1:] == [
+        "  no answer: diverged: frame 40 (effect[0].mu = 0.019)",
+        "  no fit: a run that the fit needs has no answer; the best point so far:",
+        "  neo_hooke mu: 0.011 MPa",
+    ]
+    assert "best point" not in text(replace(ended, estimates=()))
+
+
+def test_a_fit_that_has_not_converged_says_so() -> None:
+    whole = found(1.0, Estimate(MU, 0.011, 0.0105, 0.0115))
+    assert "not converged" not in text(whole)
+    assert "  not converged: a step could still lead nearer" in text(replace(whole, converged=False))

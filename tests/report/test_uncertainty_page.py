@@ -13,8 +13,8 @@ LOST = Failure({"effect[0].mu": 0.0123, "effect[1].c1": 0.003}, "diverged", "fra
 def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> None:
     first, inside, undecided, outside = uncertainty_page.sentences(study(SURFACE, band()))
     assert first == (
-        "In 95 of 100 cases with other parameters in their ranges the surface is within 2 mm of this case's, rms, where the "
-        "reference itself is known to 0.100 mm. Most of it is by mooney_rivlin c1 (70 % of the variance)."
+        "In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within 2 mm of this case's, rms, "
+        "where the reference itself is known to 0.100 mm. Most of it is by mooney_rivlin c1 (70 % of the variance)."
     )
     assert inside == "Candidates whose surface errs less than what nobody knows: fast."
     assert undecided.endswith("with the error bar of the reference: near.")
@@ -52,6 +52,13 @@ def test_a_refused_band_is_said_and_not_drawn() -> None:
     assert "<svg" not in page.html()
     assert uncertainty_page.sentences(whole) == ["No band: 12 of 64 runs have no answer."]
     assert "no band: 12 of 64" in uncertainty_page.text(whole)
+
+
+def test_a_case_without_a_solution_says_so() -> None:
+    none = replace(study(), refused="the reference diverged: frame 40", runs=0, placed=())
+    assert uncertainty_page.sentences(none) == ["No band: the reference diverged: frame 40."]
+    assert "No band: the reference diverged: frame 40." in uncertainty_page.page(none).html()
+    assert "No band: the reference diverged" in uncertainty_page.text(none)
 
 
 def test_without_sensitivities_the_reason_stands_in_their_place() -> None:

@@ -1,6 +1,7 @@
 """Numbers of a case by key: the ones of the file, changed like by the file, and refused where they are none."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,6 +10,7 @@ from fem_reference.scenes import casefile, numbers
 from tests.scenes.bars import RAMP
 
 NO_CONTROL = {"key": "effect[0].mu", "value": "10 kPa", "because": "it is softer then"}
+ACTIVE: dict[str, Any] = {"name": "fibre_active", "stress": "300 kPa", "optimal_stretch": 1.0, "ramp": RAMP}
 
 
 def test_numbers_and_units_are_those_of_the_file(bar: Path) -> None:
@@ -61,17 +63,43 @@ def test_a_value_is_checked_as_in_a_file(bar: Path) -> None:
         numbers.changed(case, {"effect[0].mu": float("nan")})
 
 
+def test_a_record_is_checked_again_as_a_whole(bar: Path) -> None:
+    """Points of a ramp out of order, and an activation at rest with nothing to balance it, are no case of a file either."""
+    effects = [{"name": "neo_hooke", "mu": "30 kPa"}, ACTIVE]
+    case = casefile.read(bar, changes={"effect": effects, "negative_control": NO_CONTROL})
+    with pytest.raises(InputError, match=r"effect\[1\]\.ramp: got .*want knots whose frames are each later"):
+        numbers.changed(case, {"effect[1].ramp[0].frame": 12.0})
+    with pytest.raises(
+        InputError, match=r"effect\[1\]\.ramp: got an amount of 0.25 at frame 0, the first, want 0 there"
+    ):
+        casefile.with_numbers(case, {"effect[1].ramp[0].amount": 0.25})
+    soft = casefile.read(bar)
+    with pytest.raises(InputError, match=r"effect\[1\]\.bulk: got 0\.01 MPa, want at least the shear modulus"):
+        casefile.with_numbers(soft, {"effect[1].bulk": 0.01})
+
+
+def test_what_stays_as_it_is_can_be_read_again() -> None:
+    """Each number of a whole shipped case, with itself: units, files and closed forms on the way are those of the file."""
+    case = casefile.read("box_squeeze")
+    for key in ("muscle.tet_size", "bone[0].motion.keyframes[1].distance", "bone[0].box.rounding", "effect[0].mu"):
+        again = casefile.with_numbers(case, {key: numbers.number(case, key)})
+        assert (again, again.key) == (case, case.key)
+
+
+def test_a_key_has_one_way_to_be_written() -> None:
+    assert numbers.canonical("effect.1.mu") == numbers.canonical("effect[01].mu") == "effect[1].mu"
+
+
 def test_a_stiffness_that_may_be_missing_and_an_amount_of_a_ramp_are_numbers_too(bar: Path) -> None:
     """As bands of attachments and of activation ask for."""
-    active = {"name": "fibre_active", "stress": "300 kPa", "optimal_stretch": 1.0, "ramp": RAMP}
-    effects = [{"name": "neo_hooke", "mu": "30 kPa"}, active]
+    effects = [{"name": "neo_hooke", "mu": "30 kPa"}, ACTIVE]
     given = {"attachment[0].stiffness": "100 kPa/mm", "effect": effects, "negative_control": NO_CONTROL}
     case = casefile.read(bar, changes=given)
     stiffness, amount = "attachment[0].stiffness", "effect[1].ramp[1].amount"
     assert (numbers.number(case, stiffness), numbers.unit(case, stiffness)) == (pytest.approx(0.1), "MPa/mm")
     assert numbers.title(case, amount) == "fibre_active ramp 2 amount"
     changed = numbers.changed(case, {stiffness: 0.2, amount: 0.5})
-    other = [effects[0], active | {"ramp": [RAMP[0], RAMP[1] | {"amount": 0.5}]}]
+    other = [effects[0], ACTIVE | {"ramp": [RAMP[0], RAMP[1] | {"amount": 0.5}]}]
     assert changed == casefile.read(bar, changes=given | {stiffness: "200 kPa/mm", "effect": other})
     with pytest.raises(InputError, match=r"effect\[1\]\.ramp\[1\]\.amount: got -1, want greater than or equal to 0"):
         numbers.changed(case, {amount: -1})

@@ -1,16 +1,21 @@
 """Calibration end to end: the moduli of a bar from its own forces, by runs of the reference."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import stand_ins
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.scenes import numbers
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers import fenicsx
 from fem_reference.studies import calibration
 from fem_reference.studies.calibration import calibrate, chosen, unit_of
 from fem_reference.studies.campaign import Workers, shared_bench
+from fem_reference.studies.unknowns import unknowns
 from tests.studies.test_uncertainty import PARALLEL, pulled
 
 MU, C1 = "effect[0].mu", "effect[1].c1"
@@ -31,7 +36,7 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     """Forces of a bar of 11 kPa with 1 % of noise: five rows about the same slope know it to 1 % / sqrt(5) and a t factor of 2.8.
     Of two matrices in parallel only the sum acts, mu + 2 c1.
     """
-    truth = shared_bench(numbers.changed(case, {MU: 0.011}), tmp_path / "runs").reference()
+    truth = shared_bench(unknowns(case).at({MU: 0.011}), tmp_path / "runs").reference()
     noise = 1 + 0.01 * np.random.default_rng(4).standard_normal(5)
     forces = np.linalg.norm(truth.force("lid"), axis=1)
     frames, places = (5, 10, 15, 20, 20), (1, 2, 3, 4, 4)
@@ -55,6 +60,24 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     assert not any(one.is_known for one in both.estimates)
     mu, c1 = both.estimates
     assert mu.value + 2 * c1.value == pytest.approx(found.estimates[0].value + 2 * 0.003, rel=1e-3)
+
+
+def test_a_run_that_diverges_is_named_with_its_values(
+    case: MuscleCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No exception: the command line ends with the status of a solver that failed."""
+
+    def solve(problem: MuscleProblem, _settings: object, sink: Callable[[Frame], None]) -> Outcome:
+        sink(Frame(0, problem.surface.points, problem.fibres.points, problem.mesh.points))
+        return Outcome("diverged", "frame 5", {"seconds": 1.0})
+
+    stand_ins.solve_by(monkeypatch, fenicsx, solve)
+    found = calibrate(
+        case, data(tmp_path, "5,force.lid,1,N,1", "10,force.lid,1,N,1"), [MU], tmp_path / "runs", Workers()
+    )
+    assert found.ended
+    assert [(one.status, one.message) for one in found.failures] == [("diverged", "frame 5")] * 2
+    assert found.failures[0].values == {MU: pytest.approx(0.01)}
 
 
 def test_quantities_have_the_units_of_the_case(case: MuscleCase) -> None:
@@ -85,13 +108,13 @@ def test_a_quantity_that_a_muscle_has_not_is_named(case: MuscleCase, quantity: s
 
 
 def test_only_a_number_with_a_range_is_fitted(case: MuscleCase, tmp_path: Path) -> None:
-    assert [one.key for one in chosen(case, [C1, MU, C1])] == [C1, MU]
+    assert [one.key for one in chosen(unknowns(case), [C1, "effect.0.mu", MU, C1])] == [C1, MU]
     with pytest.raises(
         InputError, match=r'--fit: got "effect\[2\]\.bulk", which has no range, want a key with a range'
     ):
-        chosen(case, ["effect[2].bulk"])
+        chosen(unknowns(case), ["effect[2].bulk"])
     with pytest.raises(InputError, match=r"--fit: got nothing, want one of effect\[0\]\.mu"):
-        chosen(case, [])
+        chosen(unknowns(case), [])
     with pytest.raises(InputError, match=r"row 2: frame: got 7, want one of the case: 0 to 20, every 5"):
         calibrate(case, data(tmp_path, "7,force.lid,1,N,1"), [MU], tmp_path / "runs", Workers())
     assert calibration.calibrate is calibrate

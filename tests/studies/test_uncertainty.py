@@ -1,15 +1,19 @@
 """Bands of unknown parameters by the reference itself, on a bar whose forces are known."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 import small
+import stand_ins
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers import fenicsx
 from fem_reference.studies import uncertainty
 from fem_reference.studies.campaign import Made, Workers
 from fem_reference.studies.variations import Trial
@@ -67,6 +71,21 @@ def test_matrices_in_parallel_share_the_force_as_springs_do(tmp_path: Path, monk
     assert 0.008 <= lost.values["effect[0].mu"] <= 0.012
     assert {band.refused.partition(":")[0] for band in fewer.bands} == {"1 of 10 runs have no answer"}
     assert fewer.placed == ()
+
+
+def test_a_case_without_a_solution_has_a_status_and_no_band(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Physics that fails is no mistake in the file, and no other run is worth its time."""
+
+    def solve(problem: MuscleProblem, _settings: object, sink: Callable[[Frame], None]) -> Outcome:
+        sink(Frame(0, problem.surface.points, problem.fibres.points, problem.mesh.points))
+        return Outcome("diverged", "no step was small enough at frame 10", {"seconds": 1.0})
+
+    stand_ins.solve_by(monkeypatch, fenicsx, solve)
+    monkeypatch.setattr(uncertainty, "carry_out", None)
+    found = uncertainty.study(pulled(tmp_path, {"uncertain": PARALLEL}), tmp_path / "runs", Workers(), runs=10)
+    assert found.refused == "the reference diverged: no step was small enough at frame 10"
+    assert (found.runs, found.bands, found.failures) == (0, (), ())
+    assert [one.key for one in found.parameters] == [one["key"] for one in PARALLEL]
 
 
 def lose_one(monkeypatch: pytest.MonkeyPatch) -> None:

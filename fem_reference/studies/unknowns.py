@@ -1,0 +1,71 @@
+"""The unknown parameters of a case and their ranges, by keys that count in its file, and the case with others of them."""
+
+from dataclasses import dataclass
+
+from fem_reference.assessment.uncertainty import Parameter
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import join
+from fem_reference.problems import of_case
+from fem_reference.scenes import casefile, numbers, ranges
+from fem_reference.scenes.muscle import MuscleCase
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """A case as its file has it (``whole``), in whose effects keys count, and the places there of the effects that act (``kept``):
+    with ``effects = "auto"`` those that the case itself needs, in all runs.
+    """
+
+    whole: MuscleCase
+    kept: tuple[int, ...]
+
+    @property
+    def case(self) -> MuscleCase:
+        """The case with the effects that act, listed."""
+        return self.at({})
+
+    def at(self, values: dict[str, float]) -> MuscleCase:
+        """The case with other ``values`` by key, in their units inside; InputError where a file could not have them."""
+        changed = casefile.with_numbers(self.whole, values)
+        acting = tuple(changed.effect[i] for i in self.kept)
+        return changed.model_copy(update={"effect": acting, "choice": "listed", "decisions": (), "uncertain": ()})
+
+    def acts(self, key: str) -> bool:
+        """True where the number at a ``key`` is of no effect that the case leaves out."""
+        first, *others = numbers.parts(key)
+        return first != "effect" or others[0] in self.kept
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that have a range; InputError where there are none, or the case states one of an effect that it
+        leaves out.
+        """
+        case, found = self.whole, []
+        self._check()
+        for key, one in ranges.ranges(case).items():
+            if self.acts(key):
+                low, high = ranges.ends(case, key, one, join(case.place, key))
+                named = numbers.title(case, key), numbers.unit(case, key), numbers.number(case, key)
+                found.append(Parameter(key, *named, low, high, one.spread, one.source))
+        if not found:
+            want = 'a range of some number: [[uncertain]] with key, low, high and source, such as key = "effect[0].mu"'
+            raise InputError(join(case.place, "uncertain"), "no parameter with a range", want)
+        return tuple(found)
+
+    def fixed(self) -> tuple[str, ...]:
+        """The titles of the numbers of acting effects that have no range."""
+        return tuple(numbers.title(self.whole, key) for key in ranges.left_out(self.whole) if self.acts(key))
+
+    def _check(self) -> None:
+        for i, entry in enumerate(self.whole.uncertain):
+            if not self.acts(entry.key):
+                got = f'"{entry.key}", of {numbers.title(self.whole, entry.key)}, which this case leaves out'
+                want = 'a number of an effect that acts, or effects = "listed"'
+                raise InputError(join(self.whole.place, f"uncertain[{i}].key"), got, want)
+
+
+def unknowns(case: MuscleCase) -> Unknowns:
+    """The unknowns of a case as its file has it."""
+    if case.choice == "listed":
+        return Unknowns(case, tuple(range(len(case.effect))))
+    needed = [one.needed for one in of_case.chosen(case).decisions]
+    return Unknowns(case, tuple(i for i, one in enumerate(needed) if one))
