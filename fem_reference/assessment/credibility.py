@@ -163,7 +163,9 @@ def of_arms(arms: ArmsBeside) -> Beside:
     quantity = "share_inside" if arms.is_curve else "overlap"
     reached = experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " "))
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
-    title = f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.experiment})"
+    title = (
+        f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.case} beside {arms.experiment})"
+    )
     share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else reached.value
     others = f"; fibres of another model of this body reach {reached.value:g} %" if arms.kind == "measurement" else ""
     return Beside(

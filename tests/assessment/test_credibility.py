@@ -167,6 +167,8 @@ def test_arms_are_asked_for_what_others_reach_on_this_body() -> None:
     assert not of_arms(arms(10, 20, (25, 25))).met
     assert of_arms(arms(10, 20, (15, 30), "iliacus")).value == pytest.approx(100 / 3)
     assert not of_arms(arms(10, 20, (15, 15))).validates
+    made = arms(10, 20, (15, 15))
+    assert of_arms(replace(made, case="another")).title != of_arms(made).title, "two cases of one muscle are told apart"
     assert not of_arms(arms(math.nan, 20, (15, 15))).met
 
 
