@@ -18,6 +18,7 @@ from fem_reference.report.overview import comparison_text
 from fem_reference.report.pages import Page
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import HOME, Candidate, Case, Expectation
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
@@ -35,6 +36,13 @@ def scene_of(options: argparse.Namespace) -> Case:
     units = metrics.units(against=case.standards("candidates"))
     asked = (_expectation(text, units) for text in options.limit)
     return case.model_copy(update={"expect": (*case.expect, *asked)})
+
+
+def quick_muscle(options: argparse.Namespace) -> MuscleCase:
+    """The case of a muscle at its quick size, except for what ``--set`` says."""
+    given = dict(map(casefile.setting, options.set))
+    quick = casefile.read_muscle(options.case, given).quick
+    return casefile.read_muscle(options.case, quick | given)
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:

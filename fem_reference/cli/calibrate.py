@@ -5,9 +5,9 @@ from pathlib import Path
 
 from fem_reference.assessment.calibration import facts
 from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli._cases import quick_muscle
 from fem_reference.cli._parser import share
 from fem_reference.report import calibration_texts
-from fem_reference.scenes import casefile
 from fem_reference.studies import calibration
 from fem_reference.studies.campaign import Workers
 
@@ -28,9 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Fit parameters on the quick size of a case, except for what ``--set`` says; status 1 where one is not determined, the law
     does not follow the data or the fit has not converged, and 3 where a run that it needs has no answer.
     """
-    given = dict(map(casefile.setting, options.set))
-    quick = casefile.read_muscle(options.case, given).quick
-    scene = casefile.read_muscle(options.case, quick | given)
+    scene = quick_muscle(options)
     workers = Workers(options.workers, options.scheduler)
     found = calibration.calibrate(scene, options.to, options.fit, out(options) / "runs", workers)
     write_output(facts(found), calibration_texts.text(found), options)

@@ -4,11 +4,10 @@ import argparse
 
 from fem_reference.assessment.uncertainty import facts
 from fem_reference.cli import DONE, SOLVER_FAILED, out
-from fem_reference.cli._cases import asked, publish
+from fem_reference.cli._cases import asked, publish, quick_muscle
 from fem_reference.cli._parser import positive, share
 from fem_reference.report import uncertainty_page
 from fem_reference.report.asked import Part
-from fem_reference.scenes import casefile
 from fem_reference.studies import uncertainty
 from fem_reference.studies.campaign import Workers
 
@@ -27,9 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case with other parameters, and write the page; on its quick size, except for what ``--set`` says."""
-    given = dict(map(casefile.setting, options.set))
-    quick = casefile.read_muscle(options.case, given).quick
-    scene = casefile.read_muscle(options.case, quick | given)
+    scene = quick_muscle(options)
     workers = Workers(options.workers, options.scheduler)
     found = uncertainty.study(scene, out(options) / "runs", workers, options.runs, options.seed)
     more = [Part(("--runs", str(options.runs)), f"runs{options.runs}")] if options.runs != RUNS else []
