@@ -8,12 +8,12 @@ import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.export.open_formats import write_csv
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io.formats.vtk import DataBlock
 from fem_reference.metrics import MeasurementContext, find
 from fem_reference.metrics.moment_arm import turning
 from fem_reference.problems.setup import Bone, Setup
+from fem_reference.runs.contents import vector_names
 from fem_reference.runs.store import Run
 
 FILE = "forces.csv"
@@ -22,7 +22,7 @@ _VECTORS = ("force_{}_N", "at_{}_mm", "moment_{}_N_mm")
 COLUMNS = (
     *("run", "frame", "bone", "joint", "angle_deg"),
     *(name.format(axis) for name in _VECTORS for axis in "xyz"),
-    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS), "moment_arm_by_force_mm"),
+    *("moment_about_axis_N_mm", *(f"moment_arm_{one}_mm" for one in _ARMS), "moment_arm_by_force_mm", "force_bar_N"),
 )
 _NOWHERE = np.zeros(3)
 
@@ -39,7 +39,7 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
     assert isinstance(context, MeasurementContext)  # of a muscle
     i = next((i for i, joint in enumerate(setup.joints) if joint.bone.name == bone.name), None)
     joint, lost = None if i is None else setup.joints[i], np.full((len(numbers), 3), np.nan)
-    known = has_force(run, bone)
+    known = bone.name in vector_names(run.scalars, "force_on_")
     if joint is None and not known:
         return
     centre = _NOWHERE if joint is None else joint.centre
@@ -51,18 +51,12 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
     names = [*(("moment_arm", one) for one in _ARMS), ("joint_moment", "arm")]
     measures = [find(comparison.changes[run.name], *name) for name in names]
     arms = np.array([lost[:, 0] if one is None else np.where(alone, one.values, np.nan) for one in measures])
-    columns = np.column_stack([angles, force, at, moment, about, arms.T]).tolist()
+    bars = None if run is not comparison.reference else comparison.error_bars
+    bar = None if bars is None else bars.find("change", "force_on_bone", bone.name)
+    width = lost[:, 0] if bar is None else bar.values
+    columns = np.column_stack([angles, force, at, moment, about, arms.T, width]).tolist()
     for number, values in zip(numbers, columns, strict=True):
         yield run.name, number, bone.name, "" if joint is None else joint.name, *values
-
-
-def has_force(run: Run, bone: Bone) -> bool:
-    """True where a ``run`` knows its force on a ``bone``."""
-    try:
-        run.force(bone.name)
-    except InputError:
-        return False
-    return True
 
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
@@ -83,7 +77,7 @@ def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
 
 def block(run: Run, setup: Setup, i: int) -> DataBlock | None:
     """Points of application with the vectors ``force`` [N] at the frame of index ``i``; None where the run has no force then."""
-    known = [bone for bone in setup.bones if has_force(run, bone)]
+    known = [bone for bone in setup.bones if bone.name in vector_names(run.scalars, "force_on_")]
     points = np.array([applied(run, bone, setup)[i] for bone in known]).reshape(-1, 3)
     forces = np.array([run.force(bone.name)[i] for bone in known]).reshape(-1, 3)
     shown = np.isfinite(points).all(axis=1)

@@ -15,6 +15,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
 from fem_reference.metrics.moment_arm import turning
 from fem_reference.problems.setup import Joint
+from fem_reference.runs.contents import vector_names
 from fem_reference.runs.store import Run
 
 _of_one = partial(Statistic, local=True, lone=True)
@@ -62,7 +63,7 @@ def force_arms(run: Run, joint: Joint) -> Floats:
 
 
 def _has_force(run: Run, joint: Joint) -> bool:
-    return f"force_on_{joint.bone.name}_x" in run.scalars
+    return joint.bone.name in vector_names(run.scalars, "force_on_")
 
 
 def _values(run: Run, joint: Joint) -> Floats:

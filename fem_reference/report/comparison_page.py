@@ -17,10 +17,10 @@ from fem_reference.metrics import Measure, described, find
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.drawings import look_of
+from fem_reference.report.drawings import looks
 from fem_reference.report.pages import Headlines, Page, by_name
 from fem_reference.report.sections import cost, origin
-from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, inversion, known, spread, summary
+from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, exerted, inversion, known, spread, summary
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number
 from fem_reference.runs.store import Run, seconds_per_frame
@@ -56,7 +56,7 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
     error = comparison.extension_error
     return {
         "sentence": _sentence(comparison),
-        "looks": [(run.name, look_of(i)) for i, run in enumerate(comparison.runs)],
+        "looks": list(looks(run.name for run in comparison.runs).items()),
         "comparison": comparison,
         "scene": comparison.scene,
         "reference": comparison.reference,
@@ -64,6 +64,7 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "columns": DEVIATIONS,
         "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
         "bars": known(comparison),
+        "own": (*comparison.changes[comparison.reference.name], *exerted(comparison.reference)),
         "spread": spread(comparison),
         "error": error and error.worst,
         "model_band": experiments.model_band() if comparison.error_bars and comparison.scene.task == "solve" else (),

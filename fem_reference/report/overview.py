@@ -11,7 +11,7 @@ from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described, find
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.report.tables import spread
+from fem_reference.report.tables import exerted, spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
@@ -95,7 +95,7 @@ def _known(result: Comparison) -> list[str]:
     if result.error_bars is None:
         return []
     lines = ["error bars of the reference (its greatest change from rest; the error bar of it, where that is widest):"]
-    for measure in result.changes[result.reference.name]:
+    for measure in (*result.changes[result.reference.name], *exerted(result.reference)):
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
             value = f"{measure.worst.value:.4g} {measure.unit}"

@@ -5,12 +5,15 @@ import io
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict, Word
 from fem_reference.io.texts import finite, plain
 from fem_reference.metrics import Measure, described
+from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
@@ -92,14 +95,18 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """The components of forces [N] and of moments about the origin [N mm] on each bone that a solver recorded, as measures."""
-    units = {"force_on_": "N", "moment_on_": "N mm"}
-    return tuple(
-        Measure(f"{kind}bone", name.removeprefix(kind), unit, values)
-        for kind, unit in units.items()
-        for name, values in run.scalars.items()
-        if name.startswith(kind)
-    )
+    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their lengths, by the
+    name of the bone, and their components.
+    """
+    found = list[Measure]()
+    for kind, unit in {"force_on_": "N", "moment_on_": "N mm"}.items():
+        parts = {name.removeprefix(kind): values for name, values in run.scalars.items() if name.startswith(kind)}
+        whole = {
+            bone: np.linalg.norm(scalar_vectors(run.scalars, kind, bone), axis=1)
+            for bone in vector_names(run.scalars, kind)
+        }
+        found += [Measure(f"{kind}bone", name, unit, values) for name, values in (whole | parts).items()]
+    return tuple(found)
 
 
 def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:

@@ -93,11 +93,20 @@ def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
     return {f"{name}_{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 
+def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
+    """The names whose vectors of a ``kind`` have their components in ``scalars``.
+
+    >>> vector_names(dict.fromkeys(vector_scalars("force_on_femur", np.zeros(3))), "force_on_")
+    ['femur']
+    """
+    return [key[len(kind) : -2] for key in scalars if key.startswith(kind) and key.endswith("_x")]
+
+
 def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Floats:
     """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError where ``name`` has none."""
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
-        known = ", ".join(key[len(kind) : -2] for key in scalars if key.startswith(kind) and key.endswith("_x"))
+        known = ", ".join(vector_names(scalars, kind))
         want = f"one of {known}" if known else "a run of the reference: no force is known"
         raise InputError("bone", f'"{name}"', want)
     return np.stack([scalars[key] for key in keys], axis=1)

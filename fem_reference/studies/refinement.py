@@ -4,13 +4,14 @@ import hashlib
 import logging
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import differences, error_bars
+from fem_reference.assessment import differences, error_bars, force_bars
 from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
@@ -31,7 +32,7 @@ log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
 # Files that bars are made by, beside the metrics.
-_MAKING = (differences.__file__, error_bars.__file__, __file__)
+_MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
 
 # A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement; another has a mesh of
 # its own for it, larger by so much.
@@ -80,7 +81,9 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBa
     with fenicsx.shared():
         pair = _pair(bench.of_muscle(), reference, model)
     log.info("error bar: measuring the runs against each other")
-    bars = error_bars.error_bars(pair, context_of(bench.of_muscle().setup(), reference))
+    context = context_of(bench.of_muscle().setup(), reference)
+    bars = error_bars.error_bars(pair, context)
+    bars = replace(bars, bars=(*bars.bars, *force_bars.force_bars(pair, context)))
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))
     return bars

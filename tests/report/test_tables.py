@@ -23,8 +23,9 @@ def test_forces_are_rows_of_the_run_that_recorded_them(comparison):
     found = [row for row in printed["from_rest"] if row["metric"].endswith("_on_bone") and row["frame"] == 20]
     assert {row["candidate"] for row in found} == {"reference", "quick"}
     wanted = {("force_on_bone", "plate_y", 1.5, "N"), ("moment_on_bone", "plate_z", 2.5, "N mm")}
+    wanted.add(("force_on_bone", "plate", np.sqrt(0.5**2 + 1.5**2 + 2.5**2), "N"))
     assert wanted <= {(row["metric"], row["statistic"], row["value"], row["unit"]) for row in found}
-    assert len([row for row in printed["measures"] if row["metric"] == "force_on_bone"]) == 3 * 5
+    assert len([row for row in printed["measures"] if row["metric"] == "force_on_bone"]) == 4 * 5
 
 
 def test_summary_has_the_documented_keys_and_survives_json(comparison):

@@ -1,0 +1,55 @@
+"""Error bars of the force on each bone and of its moment about the origin, as lengths of vectors.
+
+The rule is that of ``joint_moment``; a difference of two runs is the length of that of their vectors, so that no component has a
+short bar where it crosses zero. Two bones between which a muscle is in balance have the same bars.
+"""
+
+import numpy as np
+
+from fem_reference.assessment.differences import typical
+from fem_reference.assessment.error_bars import SPREAD, TETRAHEDRA, VARIATION, ErrorBar, Pair
+from fem_reference.foundations.mesh import Floats
+from fem_reference.metrics import MeasurementContext, as_surface, at_rest, measure
+from fem_reference.runs.contents import vector_names
+from fem_reference.runs.store import Run
+
+_UNITS = {"force": "N", "moment": "N mm"}
+
+
+def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
+    """The bars of ``force_on_bone`` and ``moment_on_bone`` of the reference, by bone; none where no force is known."""
+    moved = _apart(at_rest(pair.fine), pair.fine, context)
+    others = {TETRAHEDRA: (pair.coarse, pair.fine)} | {name: (run, pair.coarse) for name, run in pair.varied.items()}
+    apart = {name: _apart(*runs, context) for name, runs in others.items()}
+    bars = []
+    for kind, unit in _UNITS.items():
+        left = dict.fromkeys(others, VARIATION) | {TETRAHEDRA: pair.share("joint_moment", kind)}
+        for bone in vector_names(pair.fine.scalars, "force_on_"):
+            parts = dict[str, Floats]()
+            for name, runs in others.items():
+                size = _length(kind, bone, *runs)
+                parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
+            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
+            greatest = {name: float(part.max()) for name, part in parts.items()}
+            bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, total, greatest, _model(pair, kind, bone)))
+    return tuple(bars)
+
+
+def _apart(run: Run, other: Run, context: MeasurementContext) -> Floats:
+    """The distance (f,) [mm] of the surfaces of two runs, rms."""
+    found = measure(as_surface(run), as_surface(other), context, ["surface_deviation"])
+    return next(one.values for one in found if one.statistic == "rms")
+
+
+def _length(kind: str, bone: str, run: Run, other: Run | None = None) -> Floats:
+    """The length (f,) of the force or moment on a ``bone``, or of its difference from that of an ``other`` run."""
+    vectors = [one.force(bone) if kind == "force" else one.moment(bone) for one in (run, other) if one is not None]
+    return np.asarray(np.linalg.norm(vectors[0] - (vectors[1] if other else 0.0), axis=1))
+
+
+def _model(pair: Pair, kind: str, bone: str) -> Floats | None:
+    """The change (f,) by another model of springs: by exact attachments, where known, and by springs spread in another way."""
+    if not pair.springs:
+        return None
+    spread = SPREAD * _length(kind, bone, pair.fine)
+    return spread if pair.exact is None else np.fmax(spread, _length(kind, bone, pair.exact, pair.coarse))
