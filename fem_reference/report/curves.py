@@ -17,8 +17,7 @@ from fem_reference.report.drawings import (
     NOT_A_NUMBER,
     REFERENCE,
     Drawing,
-    colour_of,
-    look_of,
+    looks,
     over_frames,
     plain_numbers,
 )
@@ -73,10 +72,11 @@ def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
     """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,), and the range of the reference's fibres."""
+    look_by_name = looks(run.name for run in comparison.runs)
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
             continue
-        one, look = found[run.name], look_of(i)
+        one, look = found[run.name], look_by_name[run.name]
         if i == 0 and one.error_bars is not None:
             _band(axes, along[shown], one.values[shown], one.error_bars[shown])
         kept = replace(one, values=one.values[shown])
@@ -104,7 +104,7 @@ def _surface(comparison: Comparison, i: int) -> Drawing | None:
     """The distances of a candidate's surface, above the error bars of the reference."""
     run = comparison.candidates[i]
     low, high, far = surface_limits(comparison)
-    measures = comparison.deviations[run.name]
+    measures, colour = comparison.deviations[run.name], looks(one.name for one in comparison.runs)[run.name]["color"]
     found = [(find(measures, "surface_deviation", statistic), label, style) for statistic, label, style in _STATISTICS]
 
     def draw(axes: Axes) -> None:
@@ -113,7 +113,7 @@ def _surface(comparison: Comparison, i: int) -> Drawing | None:
                 if (bar := measure.error_bars) is not None:
                     _band(axes, run.numbers, np.zeros(len(bar)), bar)
                     axes.plot(run.numbers, bar, color="#888888", linewidth=1.0, linestyle=style)
-                _line(axes, run.numbers, measure, label, color=colour_of(i + 1), linestyle=style)
+                _line(axes, run.numbers, measure, label, color=colour, linestyle=style)
         if far:
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)

@@ -3,7 +3,7 @@
 import base64
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -22,8 +22,26 @@ from fem_reference.report.words import number
 
 REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
-# resemble none of these.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933", "#332288", "#777777")
+# resemble none of these; then what is left between them. style.css has them on dark paper.
+PALETTE = (
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
+    *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c"),
+)
+# Runs that have their own colour of the palette on all pages, in its order. A name that is not here is no mistake.
+_OURS = (
+    *(
+        "pbd",
+        "arap_pbd",
+        "mass_spring",
+        "rbf_muscle",
+        "viper",
+        "straight_lines",
+        "via_points",
+        "wrapping",
+        "hill_lines",
+    ),
+    *("xpbd", "arap", "pbd_program", "arap_volume_step"),
+)
 # Lines of so many runs are told apart by colour alone; the next ones are broken.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
@@ -69,9 +87,9 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The colour of the i-th run, the reference first: the palette, then its colours ever darker.
+    """The i-th colour, that of the reference first: the palette, then its colours ever darker.
 
-    >>> colour_of(0), colour_of(1), colour_of(11)
+    >>> colour_of(0), colour_of(1), colour_of(15)
     ('#222222', '#0072b2', '#004c77')
     """
     if i == 0:
@@ -82,12 +100,25 @@ def colour_of(i: int) -> str:
 
 
 def look_of(i: int) -> dict[str, Any]:
-    """The colour and the dashes of the line of the i-th run, the reference first.
+    """The colour and the dashes of the i-th line, that of the reference first.
 
     >>> look_of(1), look_of(7)
     ({'color': '#0072b2', 'linestyle': '-'}, {'color': '#882255', 'linestyle': '--'})
     """
     return {"color": colour_of(i), "linestyle": _DASHES[max(i - 1, 0) // _BY_COLOUR % len(_DASHES)]}
+
+
+def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Colour and dashes by the name of a run or solver: of ours the same on all pages, of others what is left, in their order.
+
+    >>> looks(["reference", "mine", "pbd"])["pbd"] == looks(["fenicsx", "pbd"])["pbd"] == look_of(1)
+    True
+    """
+    asked = tuple(dict.fromkeys(names))
+    known = {"reference" if "reference" in asked else "fenicsx": 0} | {name: i for i, name in enumerate(_OURS, 1)}
+    others = (name for name in asked if name not in known)
+    known |= {name: i for i, name in enumerate(others, len(known))}
+    return {name: look_of(known[name]) for name in asked}
 
 
 def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from fem_reference.assessment import omissions
 from fem_reference.assessment.omissions import Ablation, CaseOmissions, Omission
 from fem_reference.metrics import described
-from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
+from fem_reference.report.drawings import BAND, Drawing, drawn, looks, plain_numbers
 from fem_reference.report.pages import Page, by_name
 from fem_reference.report.study_page import title_of
 from fem_reference.report.words import duration, listed, number, words
@@ -113,8 +113,8 @@ def drawing(found: CaseOmissions) -> Drawing | None:
     floor = max(low, 1e-3 * (bar or max(changes) or 1.0)) / _DEPTH
 
     def draw(figure: Figure, axes: Axes) -> None:
-        for i, (name, rows) in enumerate(points.items()):
-            _draw(axes, rows, floor, colour_of(i), name)
+        for name, look in looks(points).items():
+            _draw(axes, points[name], floor, look["color"], name)
         axes.set_yscale("log")
         axes.set_ylim(floor / 2, 3 * max(*changes, bar, floor))
         plain_numbers(axes.yaxis)

@@ -71,8 +71,8 @@
     svg.append(element("text", { x: (LEFT + W - RIGHT) / 2, y: H - 10, "text-anchor": "middle", "font-size": 13, fill: "currentColor" }, words(cost) + (unit ? `, ${unit}` : "")));
     svg.append(element("text", { transform: `translate(16 ${(TOP + H - BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle", "font-size": 13, fill: "currentColor" }, `${words(error)}, ${found.units[error]}`));
     let shown = 0;
-    [...new Set(found.points.map(point => point.solver))].forEach((solver, i) => {
-      const own = points.filter(point => point.solver === solver), colour = study.colours[i % study.colours.length];
+    [...new Set(found.points.map(point => point.solver))].forEach(solver => {
+      const own = points.filter(point => point.solver === solver), colour = study.colours[solver];
       if (!own.length) return;
       const line = front(own, error, cost, bar).map(pair => `${x.at(pair[0])},${y.at(pair[1])}`).join(" ");
       svg.append(element("polyline", { points: line, fill: "none", stroke: colour, "stroke-width": 1.5 }));

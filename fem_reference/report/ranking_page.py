@@ -11,7 +11,7 @@ from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.io.texts import finite
 from fem_reference.metrics import described
-from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.drawings import Drawing, drawn, logarithmic, looks
 from fem_reference.report.pages import Page
 
 # What is measured: metric, statistic, words above the column, unit.
@@ -82,30 +82,26 @@ def _row(one: SolverResult) -> dict[str, Any]:
 def _drawing(table: Table) -> Drawing:
     """Deviation of the surface against the time of a frame, everybody on every scene; a legend of colours and one of marks."""
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
-    colours = _colours([one for one, _ in shown])
+    # The reference first.
+    colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))
     marks = {scenario.case: _MARKS[i % len(_MARKS)] for i, scenario in enumerate(table.scenarios)}
 
     def draw(figure: Figure, axes: Axes) -> None:
         for one, (x, y) in shown:
             look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
-            axes.plot([x], [y], marks[one.case], color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
+            axes.plot(
+                [x], [y], marks[one.case], color=colours[_label_of(one)]["color"], markersize=7, alpha=0.85, **look
+            )
         logarithmic(axes)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.set(xlabel="time for a frame number, ms", ylabel="% of the greatest displacement")
-        handles = [axes.plot([], [], "o", color=colour, label=name)[0] for name, colour in colours.items()]
+        handles = [axes.plot([], [], "o", color=one["color"], label=name)[0] for name, one in colours.items()]
         handles += [axes.plot([], [], mark, color="#777777", label=case)[0] for case, mark in marks.items()]
         figure.legend(handles=handles, loc="outside right upper")
 
     title = "Surface deviation (rms, worst frame) against the time for a frame number"
     return drawn("ranking", title, (9.6, 4.6), draw)
-
-
-def _colours(results: list[SolverResult]) -> dict[str, str]:
-    """A colour for everybody who is drawn, the reference first."""
-    names = dict.fromkeys(_label_of(one) for one in sorted(results, key=lambda one: not one.of_reference))
-    first = 0 if any(one.of_reference for one in results) else 1
-    return {name: colour_of(i) for i, name in enumerate(names, first)}
 
 
 def _label_of(one: SolverResult) -> str:

@@ -16,7 +16,7 @@ from fem_reference.assessment.recommendation import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
-from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, logarithmic
+from fem_reference.report.drawings import BAND, Drawing, drawn, logarithmic, looks
 from fem_reference.report.pages import Page, by_name
 from fem_reference.report.words import duration, listed, number
 from fem_reference.report.words import title_of as in_words
@@ -120,9 +120,9 @@ def front(case: CaseStudy, error: str) -> Drawing:
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
-        for i, solver in enumerate(solvers(case.points)):
+        for solver, look in looks(solvers(case.points)).items():
             pairs = [pair for pair in shown_points(case) if pair[0].solver == solver]
-            _draw(axes, pairs, error, solver, colour_of(i))
+            _draw(axes, pairs, error, solver, look["color"])
         logarithmic(axes)
         if (bar := case.bars.get(error, 0.0)) > 0:
             axes.set_ylim(bottom=min(axes.get_ylim()[0], bar / 2))
@@ -171,7 +171,7 @@ def _data(study: Study) -> dict[str, Any]:
         | {"points": [facts(one) for one, _ in shown_points(case) if one.status == "converged"]}
         for case in study.cases
     ]
-    colours = [colour_of(i) for i in range(len(solvers(study.points)))]
+    colours = {solver: look["color"] for solver, look in looks(solvers(study.points)).items()}
     return {"costs": COSTS, "reference": REFERENCE, "colours": colours, "cases": cases}
 
 

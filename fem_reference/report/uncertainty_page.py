@@ -8,13 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.uncertainty import Band, Placed, Uncertainty, facts
-from fem_reference.report.drawings import BAND, REFERENCE, Drawing, drawn, look_of, over_frames
+from fem_reference.report.drawings import BAND, REFERENCE, Drawing, drawn, looks, over_frames
 from fem_reference.report.pages import Page
 from fem_reference.report.words import listed, number
 
 # Of the height of a band, how far beyond it lines of candidates are drawn.
 _BEYOND = 1.5
-_SHADE, _FIRST, _TOTAL = "#0072b2", "#0072b2", "#56b4e9"
+_SHADE, _FIRST, _TOTAL = "#888888", "#0072b2", "#56b4e9"
 
 
 def page(found: Uncertainty) -> Page:
@@ -110,8 +110,9 @@ def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
         axes.fill_between(frames, 0 if band.distance else -bar, bar, color=BAND, linewidth=0, label="error bar")
     if not band.distance:
         axes.axhline(0, color=REFERENCE, linewidth=1.5, label="the case")
-    for i, one in enumerate([one for one in found.placed if one.quantity == band.quantity]):
-        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **look_of(i + 2))
+    look = looks(one.candidate for one in found.placed)
+    for one in (one for one in found.placed if one.quantity == band.quantity):
+        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **look[one.candidate])
     bottom, top = min(np.nanmin(low), 0 if band.distance else np.nanmin(-bar)), max(np.nanmax(high), np.nanmax(bar))
     room = _BEYOND * (top - bottom) or 1.0
     axes.set_ylim(-0.03 * room if band.distance else bottom - room / 2, top + room / (1 if band.distance else 2))

@@ -4,6 +4,7 @@ import base64
 import io
 import itertools
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+from fem_reference import solvers
 from fem_reference.report import drawings
+from fem_reference.scenes import casefile
 
 
 def line(_figure, axes) -> None:
@@ -61,13 +64,35 @@ def test_no_two_runs_have_one_colour() -> None:
     assert len({drawings.colour_of(i) for i in range(40)}) == 40
 
 
+# The colours of a page on dark paper, by those on light paper.
+STYLE = (Path(drawings.__file__).parent / "style.css").read_text(encoding="utf-8")
+DARK = {f"#{light}": dark for light, dark in re.findall(r"--c-(\w{6}): (#\w{6})", STYLE)}
+
+
 @pytest.mark.parametrize("vision", VISION)
-def test_ten_runs_are_told_apart_by_their_lines_whatever_colours_one_sees(vision) -> None:
-    for one, other in itertools.combinations(map(drawings.look_of, range(11)), 2):
-        if one["linestyle"] == other["linestyle"]:
-            # Four times what is just noticeable, as lines are thin.
-            apart = seen(one["color"], VISION[vision]) - seen(other["color"], VISION[vision])
-            assert np.linalg.norm(apart) > 10, (one, other)
+@pytest.mark.parametrize("paper", [{}, DARK], ids=["light", "dark"])
+def test_fourteen_runs_and_the_reference_are_told_apart_by_their_lines_whatever_colours_one_sees(vision, paper) -> None:
+    for one, other in itertools.combinations(map(drawings.look_of, range(15)), 2):
+        first, second = (seen(paper.get(look["color"], look["color"]), VISION[vision]) for look in (one, other))
+        # Four times what is just noticeable, as lines are thin; marks have colours alone, for all who see all of these.
+        least = 10 if one["linestyle"] == other["linestyle"] else 20 if vision == "all" else 0
+        assert np.linalg.norm(first - second) >= least, (one, other)
+
+
+def test_each_of_our_solvers_has_one_colour_on_all_pages() -> None:
+    """Solvers of Table 5.1 and candidates of the five muscles: theirs alone, whatever else is shown, and in any order."""
+    cases = map(
+        casefile.read, ("hip_flexion", "gluteus_maximus", "gluteus_medius", "iliacus_anatomical", "adductor_brevis")
+    )
+    candidates = [one for case in cases for one in (*case.candidate, *solvers.in_table())]
+    ours = list(dict.fromkeys(one.name for one in candidates if one.solver != "recorded"))
+    found = drawings.looks(["reference", "mine", *ours, "theirs"])
+    assert len({look["color"] for look in found.values()}) == len(ours) + 3 >= 16
+    assert found["reference"]["color"] == drawings.REFERENCE == drawings.looks(["fenicsx"])["fenicsx"]["color"]
+    same = [name for name in ours if drawings.looks(["yours", name])[name] == found[name]]
+    assert len(same) >= 13  # all but a solver that came later
+    assert drawings.looks(["theirs", "pbd", "mine"])["theirs"] == found["mine"]  # what is left, in their order
+    assert drawings.looks(["reference", "fenicsx"])["fenicsx"] == found["mine"]  # a candidate by the same solver
 
 
 def test_powers_of_ten_are_written_as_numbers() -> None:
