@@ -38,11 +38,11 @@ def scene_of(options: argparse.Namespace) -> Case:
     return case.model_copy(update={"expect": (*case.expect, *asked)})
 
 
-def quick_muscle(options: argparse.Namespace) -> MuscleCase:
-    """The case of a muscle at its quick size, except for what ``--set`` says."""
+def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
+    """The ``case`` of a muscle, where asked at its ``quick`` size, except for what ``--set`` says."""
     given = dict(map(casefile.setting, options.set))
-    quick = casefile.read_muscle(options.case, given).quick
-    return casefile.read_muscle(options.case, quick | given)
+    sizes = casefile.read_muscle(case, given).quick if quick else {}
+    return casefile.read_muscle(case, sizes | given)
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fem_reference.assessment.calibration import facts
 from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
-from fem_reference.cli._cases import quick_muscle
+from fem_reference.cli._cases import muscle_case
 from fem_reference.cli._parser import share
 from fem_reference.report import calibration_texts
 from fem_reference.studies import calibration
@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Fit parameters on the quick size of a case, except for what ``--set`` says; status 1 where one is not determined, the law
     does not follow the data or the fit has not converged, and 3 where a run that it needs has no answer.
     """
-    scene = quick_muscle(options)
+    scene = muscle_case(options.case, options, quick=True)
     workers = Workers(options.workers, options.scheduler)
     found = calibration.calibrate(scene, options.to, options.fit, out(options) / "runs", workers)
     write_output(facts(found), calibration_texts.text(found), options)

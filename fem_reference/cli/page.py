@@ -1,19 +1,29 @@
 """The verb ``page``: a page over several cases."""
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from fem_reference import report
 from fem_reference.assessment import credibility
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
-from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
+from fem_reference.cli._cases import (
+    case_part,
+    changes,
+    check_names,
+    checked_bench,
+    muscle_case,
+    own_candidates,
+    publish,
+    status,
+)
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, credibility_page, estimation_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
+from fem_reference.report.words import listed
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
@@ -33,30 +43,27 @@ OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figur
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    names = sorted([EXAMPLES, TABLE, CLAIMS, ESTIMATION, CREDIBILITY])
+    names = sorted(_PAGES)
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
-    solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres (half an hour)"
+    solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres"
     parser.add_argument("--solve", action="store_true", help=solving)
-    share(parser, "--unit", "--name")
+    size = f"for {TABLE} and {ESTIMATION}: cases at their sizes for quick solutions"
+    parser.add_argument("--quick", action="store_true", help=size)
+    share(parser, "--set", "--error-bar", "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
-    if options.solve and options.name != ESTIMATION:
-        raise InputError("page", f"--solve for {options.name}", f"it for {ESTIMATION} only")
-    if options.name == TABLE:
-        return _table(options)
-    if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
-        return _claims(options) if options.name == CLAIMS else _estimation(options)
-    if options.case or options.candidate or options.unit:
-        without_cases = options.name in (EXAMPLES, CREDIBILITY)
-        given = "--case, --candidate or --unit" if without_cases else "--candidate or --unit"
-        raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
-    return _credibility(options) if options.name == CREDIBILITY else _examples(options)
+    takes, write = _PAGES[options.name]
+    for option in ("case", "candidate", "unit", "set", "quick", "error_bar", "solve"):
+        if getattr(options, option) and option not in takes:
+            others = listed([name for name, (taken, _) in _PAGES.items() if option in taken])
+            raise InputError("page", f"--{option.replace('_', '-')} for {options.name}", f"it for {others} only")
+    return write(options)
 
 
 def _examples(options: argparse.Namespace) -> int:
@@ -75,11 +82,12 @@ def _examples(options: argparse.Namespace) -> int:
 
 def _table(options: argparse.Namespace) -> int:
     """The kinds of solvers in the report's table, measured."""
-    scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or table_5_1.SCENARIOS)}
+    scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
-    table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
+    with fenicsx.shared():
+        table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign, error_bars=options.error_bar)
     pairs = [(case, one) for case, found in foreign.items() for one in found]
     more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
     asked = _asked(scenes.values(), options, more)
@@ -88,7 +96,7 @@ def _table(options: argparse.Namespace) -> int:
 
 
 def _claims(options: argparse.Namespace) -> int:
-    scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
+    scenes = _scenes(options, true_errors.CASES)
     found = true_errors.stake(scenes, out(options) / "runs")
     whole = Cover.of(found.claims)
     covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"
@@ -100,7 +108,7 @@ def _claims(options: argparse.Namespace) -> int:
 
 
 def _estimation(options: argparse.Namespace) -> int:
-    scenes = [casefile.read_muscle(case) for case in options.case or estimation.CASES]
+    scenes = _scenes(options, estimation.CASES)
     with fenicsx.shared():
         found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
     if not found.fits:
@@ -127,9 +135,24 @@ def _credibility(options: argparse.Namespace) -> int:
     return DONE
 
 
+_PAGES: dict[str, tuple[tuple[str, ...], Callable[[argparse.Namespace], int]]] = {
+    TABLE: (("case", "candidate", "unit", "set", "quick", "error_bar"), _table),
+    CLAIMS: (("case",), _claims),
+    ESTIMATION: (("case", "set", "quick", "solve"), _estimation),
+    CREDIBILITY: ((), _credibility),
+    EXAMPLES: ((), _examples),
+}
+
+
+def _scenes(options: argparse.Namespace, names: Iterable[str]) -> list[MuscleCase]:
+    """The cases that are asked for, else those of ``names``."""
+    return [muscle_case(name, options, quick=options.quick) for name in options.case or names]
+
+
 def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:
     cases = [Part(("--case", case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
-    return Asked("page", options.name, (Part((options.name,)), *cases, *more))
+    size = [Part(("--quick",), "quick")] if options.quick else []
+    return Asked("page", options.name, (Part((options.name,)), *cases, *size, *changes(options), *more))
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:

@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference.assessment.uncertainty import facts
 from fem_reference.cli import DONE, SOLVER_FAILED, out
-from fem_reference.cli._cases import asked, publish, quick_muscle
+from fem_reference.cli._cases import asked, muscle_case, publish
 from fem_reference.cli._parser import positive, share
 from fem_reference.report import uncertainty_page
 from fem_reference.report.asked import Part
@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case with other parameters, and write the page; on its quick size, except for what ``--set`` says."""
-    scene = quick_muscle(options)
+    scene = muscle_case(options.case, options, quick=True)
     workers = Workers(options.workers, options.scheduler)
     found = uncertainty.study(scene, out(options) / "runs", workers, options.runs, options.seed)
     more = [Part(("--runs", str(options.runs)), f"runs{options.runs}")] if options.runs != RUNS else []

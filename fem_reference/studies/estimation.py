@@ -31,7 +31,6 @@ from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.metrics import as_surface, context_of
 from fem_reference.problems import anatomy, muscle
 from fem_reference.problems.setup import Setup
-from fem_reference.scenes import casefile
 from fem_reference.scenes.fibres import Chmd, Fibres, KohoutKukacka, Traced
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost, refinement
@@ -63,7 +62,7 @@ _OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
-    """All techniques on all cases; with a ``store``, the reference's answers with each decomposition, at each case's quick size."""
+    """All techniques on all cases; with a ``store``, also the reference's answers with each decomposition."""
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
@@ -75,7 +74,7 @@ def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimati
         fits += of_surface(case.name, setup)
         decompositions += of_decompositions(case, setup)
         if store is not None:
-            changes += answers(casefile.read_muscle(case.name, case.quick) if case.quick else case, store)
+            changes += answers(case, store)
     return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions), tuple(changes))
 
 

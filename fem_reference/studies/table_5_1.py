@@ -37,8 +37,12 @@ FOREIGN = "Yours"
 _AVOIDS = ("collision", "contact", "voxels")  # settings with which a solver avoids bones
 
 
-def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
-    """The table over ``scenes``, with runs in ``store``; ``foreign`` frames, by case, are read before anything is solved."""
+def stand(
+    scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]], *, error_bars: bool = False
+) -> Table:
+    """The table over ``scenes``, with runs in ``store``; ``foreign`` frames, by case, are read before anything is solved. The
+    reference has the ``error_bars`` that are stored, else new ones where asked.
+    """
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {
@@ -48,7 +52,7 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
     there, missing = each(benches, lambda bench: bench.setup())
     for i, name in enumerate(there):
         log.info("scene %d of %d: %s", i + 1, len(there), name)
-        scenario, found = _on(benches[name], rows, read[name])
+        scenario, found = _on(benches[name], rows, read[name], error_bars)
         scenarios.append(scenario)
         results += found
     if foreign:
@@ -58,12 +62,12 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
 
 
 def _on(
-    bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run]
+    bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run], error_bars: bool
 ) -> tuple[Scenario, list[SolverResult]]:
     """The results of all solvers on the scene of a bench, the reference first."""
     scene = bench.scene
     reference = complete(bench.reference(), scene.numbers)
-    bars = refinement.stored(reference)
+    bars = refinement.bars(bench, reference, model=False) if error_bars else refinement.stored(reference)
     context = context_of(bench.setup(), reference)
     measures, own = bars.of_deviations if bars else (), needs(scene, scene.reference, context)
     results = [_result(scene, REFERENCE, reference, measures, own)]

@@ -16,7 +16,7 @@ def test_a_page_of_cases_without_their_files_is_refused_with_the_reason(
 
 
 def test_a_page_of_all_quantities_takes_no_cases(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (("--case", "hip_flexion"), ("--unit", "mm"), ("--solve",)):
+    for words in (("--case", "hip_flexion"), ("--unit", "mm"), ("--solve",), ("--quick",), ("--error-bar",)):
         assert cli.main(["page", "credibility", *words, "--out", str(tmp_path)]) == 2
         assert "for credibility" in capsys.readouterr().err
 

@@ -83,6 +83,19 @@ def test_everybody_is_measured_against_the_reference(case) -> None:
         assert word in html
 
 
+def test_sizes_for_quick_solutions_changes_and_error_bars_are_taken_where_asked(case) -> None:
+    """A quick size that ends at frame 10, 10 mm up; a change that ends at frame 5; and bars of the reference."""
+    with (case / "case.toml").open("a") as file:
+        file.write('\n[quick]\n"frames.last" = 10\n')
+    for words, end in (([], 20), (["--quick"], 10), (["--quick", "--set", "frames.last=5", "--error-bar"], 5)):
+        _, facts, _ = page(case, *words, "--name", f"table-5-1-{end}")
+        assert facts["scenarios"][0]["travel_mm"] == pytest.approx(end)
+        for one in (case.parent / "out").glob("table-5-1*"):
+            one.unlink()
+    bar = facts["results"][0]["worst"]["surface_deviation.rms"]
+    assert (bar["value"], bar["unit"]) == (pytest.approx(0, abs=1e-6), "mm")  # all sizes are shifted alike
+
+
 def test_parameters_are_counted_from_records(case) -> None:
     """Attachments and bones are those of the case; a default that is written out is no parameter."""
     read = casefile.read_muscle(case)
@@ -158,7 +171,8 @@ def test_a_foreign_solver_that_cannot_stand_is_bad_input(case, words, place, cap
 
 def test_other_pages_have_no_candidates(capsys) -> None:
     assert cli.main(["page", "octave-examples", "--case", "rod", "--quiet"]) == cli.BAD_INPUT
-    assert "page: got --case, --candidate or --unit for octave-examples" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "page: got --case for octave-examples, want it for table-5-1, error-bars and estimation only" in said
 
 
 def table(*found: SolverResult) -> Table:
