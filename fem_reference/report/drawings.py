@@ -25,7 +25,7 @@ REFERENCE = "#222222"
 # resemble none of these; then what is left between them. style.css has them on dark paper.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
-    *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c"),
+    *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
 )
 # Runs that have their own colour of the palette on all pages, in its order. A name that is not here is no mistake.
 _OURS = (
@@ -40,7 +40,7 @@ _OURS = (
         "wrapping",
         "hill_lines",
     ),
-    *("xpbd", "arap", "pbd_program", "arap_volume_step"),
+    *("xpbd", "arap", "pbd_program", "arap_volume_step", "line_of_action"),
 )
 # Lines of so many runs are told apart by colour alone; the next ones are broken.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
@@ -89,7 +89,7 @@ class Drawing:
 def colour_of(i: int) -> str:
     """The i-th colour, that of the reference first: the palette, then its colours ever darker.
 
-    >>> colour_of(0), colour_of(1), colour_of(15)
+    >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
     """
     if i == 0:
