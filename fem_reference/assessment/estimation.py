@@ -62,6 +62,20 @@ class DecompositionError:
 
 
 @dataclass(frozen=True)
+class RodError:
+    """A muscle as ``rods`` of one ``radius`` [mm] along its fibres, together of its volume, as ``viper`` has them at rest: the
+    share of the muscle that is ``filled``, that of the rods that is ``outside``, and that in which they ``overlap``.
+    """
+
+    case: str
+    rods: int
+    radius: float
+    filled: float
+    outside: float
+    overlap: float
+
+
+@dataclass(frozen=True)
 class AnswerChange:
     """The change of the reference's answer with fibres of a ``source`` in place of those of ``against``: by ``metric.statistic``
     the greatest over the frames, empty where a solution is missing (``status``); ``bars``: the error bars of the answer.
@@ -85,3 +99,4 @@ class Estimation:
     missing: dict[str, str]
     decompositions: tuple[DecompositionError, ...] = ()
     answers: tuple[AnswerChange, ...] = ()
+    rods: tuple[RodError, ...] = ()

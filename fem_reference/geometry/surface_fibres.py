@@ -12,6 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
+_THIN = 1e-6  # lines whose section is thinner than this, squared over its width, are on one surface
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # from seed to seed of a sunflower [rad]
 
 
@@ -38,15 +39,41 @@ def _alike(lines: Polylines, head: int) -> Floats:
 
 
 def _around(lines: Floats) -> Floats:
-    """The ``lines`` (m, 40, 3) in the order of their angles halfway, about the direction of their mean, the farthest first."""
+    """The ``lines`` (m, 40, 3) in the order of their angles halfway, the farthest first."""
+    arms = _halfway(lines)
+    angles = np.arctan2(arms[:, 1], arms[:, 0]) % (2 * np.pi)
+    return np.asarray(lines[np.argsort(np.where(angles > 2 * np.pi - 1e-9, 0.0, angles))])
+
+
+def _halfway(lines: Floats) -> Floats:
+    """The places (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, across their mean and from it; the farthest is on the first axis."""
     mean = lines.mean(axis=0)
     normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
+    normal /= np.linalg.norm(normal)
     arms = lines[:, POINTS // 2] - mean[POINTS // 2]
-    arms -= np.outer(arms @ normal, normal) / (normal @ normal)
+    arms -= np.outer(arms @ normal, normal)
     first = arms[np.argmax(np.linalg.norm(arms, axis=1))]
-    second = np.cross(normal, first) / np.linalg.norm(normal)
-    angles = np.arctan2(arms @ second, arms @ first) % (2 * np.pi)
-    return np.asarray(lines[np.argsort(np.where(angles > 2 * np.pi - 1e-9, 0.0, angles))])
+    axes = np.array([first, np.cross(normal, first)]) / np.linalg.norm(first)
+    return np.asarray(arms @ axes.T)
+
+
+def outermost(lines: Polylines, count: int) -> Polylines:
+    """At most ``count`` of ``lines``, by 40 points each: in each of as many sectors halfway the farthest out. Sectors are equal
+    where the section of the lines is stretched to be as wide in all directions, so that a flat muscle has lines on all sides.
+    """
+    found = _alike(lines, 0)
+    arms = _halfway(found)
+    scales, axes = np.linalg.eigh(arms.T @ arms)
+    if scales[0] <= _THIN * scales[1]:
+        raise InputError("fibres.chmd.around", "lines on one surface", "a muscle with a thickness")
+    round_ones = arms @ (axes / np.sqrt(scales)) @ axes.T
+    angles = np.arctan2(round_ones[:, 1], round_ones[:, 0])
+    angles -= angles[np.argmax(arms[:, 0])]  # the farthest
+    sectors = np.rint(count * angles / (2 * np.pi)).astype(np.int64) % count
+    order = np.lexsort((-np.linalg.norm(round_ones, axis=1), sectors))
+    _, chosen = np.unique(sectors[order], return_index=True)
+    best = found[order[chosen]]
+    return Polylines(best.reshape(-1, 3), np.arange(len(best) + 1) * POINTS)
 
 
 def _shares(grids: Sequence[Floats], count: int) -> Ints:

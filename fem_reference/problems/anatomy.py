@@ -18,9 +18,9 @@ from fem_reference.geometry.flux_fibres import area_flux, streamlines
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.skins import edge_lengths
-from fem_reference.geometry.surface_fibres import between
+from fem_reference.geometry.surface_fibres import between, outermost
 from fem_reference.io import files
-from fem_reference.scenes.fibres import PolylineFile
+from fem_reference.scenes.fibres import PolylineFile, Traced
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
@@ -169,6 +169,8 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this many tets.
 TETS = 8000
+# Of so many lines for each that is needed, those farthest out, just below the surface, stand for fibres on it.
+_OUTER = 5
 
 
 def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
@@ -185,18 +187,27 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
         return lines, NearestLine(lines)
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
-    traced, ends = case.fibres.traced, case.fibres.ends.values()
-    if traced is not None and traced.flux == "area":
-        flux = area_flux(mesh, *ends)
-        return streamlines(flux, traced.count), flux.field
-    field = fibre_field(mesh, *ends)
-    if traced is not None:
-        return trace(field, traced.count), field
+    if (traced := case.fibres.traced) is not None:
+        return _along_field(mesh, traced, traced.count)
+    if (chmd := case.fibres.chmd) is not None and (around := chmd.around) is not None:
+        outer = outermost(_along_field(mesh, around, _OUTER * around.count)[0], around.count)
+        lines = between([outer], chmd.count)
+        return lines, NearestLine(lines)
     asked = case.fibres.kohout_kukacka
     assert asked is not None  # a Fibres record has one source
+    field = fibre_field(mesh, asked.start, asked.end)
     towards = None if asked.towards is None else np.array(asked.towards)
     lines = mapped(field, contours(field, asked.contours, towards), asked.count, asked.pennation or 0.0)
     return lines, NearestLine(lines)
+
+
+def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, Directions]:
+    """``count`` lines of the Laplace field that is ``asked`` for, and its directions."""
+    if asked.flux == "area":
+        flux = area_flux(mesh, asked.start, asked.end)
+        return streamlines(flux, count), flux.field
+    field = fibre_field(mesh, asked.start, asked.end)
+    return trace(field, count), field
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
@@ -217,7 +228,7 @@ def _given(case: MuscleCase) -> Polylines | None:
     """The lines in the file of a case, or between those in its files."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
-    if (asked := case.fibres.chmd) is not None:
+    if (asked := case.fibres.chmd) is not None and asked.heads is not None:
         heads = [_read(case, head, f"fibres.chmd.heads[{i}]") for i, head in enumerate(asked.heads)]
         return between(heads, asked.count)
     return None

@@ -58,7 +58,7 @@ def said(found: Estimation) -> str:
 
 def facts(found: Estimation) -> dict[str, Any]:
     """All of it as valid JSON."""
-    names = ("curves", "heights", "fits", "decompositions", "answers", "missing")
+    names = ("curves", "heights", "fits", "decompositions", "rods", "answers", "missing")
     return {name: plain(getattr(found, name)) for name in names}
 
 

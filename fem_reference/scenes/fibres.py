@@ -57,10 +57,15 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres between those on the muscle's surface: three or more around each of its ``heads``, by file."""
+    """Fibres between those on the muscle's surface: three or more around each of its ``heads``, by file; or, where no file has
+    any, lines of the Laplace field just below the surface, ``around`` the muscle.
+    """
 
     count: int = Field(gt=0, le=1000)
-    heads: tuple[PolylineFile, ...] = Field(min_length=1)
+    heads: Annotated[tuple[PolylineFile, ...], Field(min_length=1)] | None = None
+    around: Traced | None = None
+
+    _check = one_of("heads", "around")
 
 
 class Fibres(Record):
@@ -81,7 +86,8 @@ class Fibres(Record):
     @property
     def ends(self) -> dict[str, str]:
         """The attachments that the fibres run between, by the key that names them; none where a file has the fibres."""
-        between = {"traced": self.traced, "kohout_kukacka": self.kohout_kukacka}
+        around = None if self.chmd is None else self.chmd.around
+        between = {"traced": self.traced, "kohout_kukacka": self.kohout_kukacka, "chmd.around": around}
         return {
             f"fibres.{source}.{end}": getattr(one, end)
             for source, one in between.items()

@@ -21,6 +21,7 @@ from fem_reference.assessment.estimation import (
     Estimation,
     FitError,
     HeightError,
+    RodError,
 )
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, enclosed_volume
 from fem_reference.geometry import radial_basis
@@ -54,10 +55,11 @@ ANSWERS = (
     "joint_moment.force",
 )
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
-COUNT, CONTOURS = 20, 20
+COUNT, CONTOURS, AROUND = 20, 20, 12
 NEAR = 0.2  # two fibres that are nearer [mm] between their ends cross
 _ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
 _LOOKED_AT = 400  # points at which a fibre is looked at
+_SAMPLES = 20_000  # random points in the box around a muscle
 _OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
 
 
@@ -66,16 +68,19 @@ def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimati
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
-    decompositions, changes = list[DecompositionError](), list[AnswerChange]()
+    decompositions, changes, rods = list[DecompositionError](), list[AnswerChange](), list[RodError]()
     for case, setup in ((named[name], setup) for name, setup in setups.items()):
         log.info("%s: curves, heights and surfaces", case.name)
-        curves += of_fibres(case.name, muscle.build(case, setup).fibres)
+        fibres = muscle.build(case, setup).fibres
+        curves += of_fibres(case.name, fibres)
+        rods.append(of_rods(case.name, setup.surface, fibres))
         heights += of_attachments(case.name, setup)
         fits += of_surface(case.name, setup)
         decompositions += of_decompositions(case, setup)
         if store is not None:
             changes += answers(case, store)
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, tuple(decompositions), tuple(changes))
+    measured = tuple(curves), tuple(heights), tuple(fits)
+    return Estimation(*measured, missing, tuple(decompositions), tuple(changes), tuple(rods))
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
@@ -136,6 +141,21 @@ def of_surface(case: str, setup: Setup) -> Iterator[FitError]:
         yield FitError(case, len(surface.points), count, float(np.sqrt(np.mean(off**2))), float(off.max()), share)
 
 
+def of_rods(case: str, surface: Surface, fibres: Polylines) -> RodError:
+    """The rods along ``fibres``, at random points of the box around them and the muscle."""
+    volume = enclosed_volume(surface.points, surface.triangles)
+    radius = float(np.sqrt(volume / (np.pi * fibres.lengths().sum())))
+    lines = np.concatenate([_along(fibres.points[low:high]) for low, high in pairwise(fibres.offsets)])
+    corners = np.concatenate([surface.points, lines - radius, lines + radius])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    points = np.random.default_rng(0).uniform(low, high, (_SAMPLES, 3))
+    covered = cKDTree(lines).query(points, distance_upper_bound=radius)[0] <= radius
+    own = signed_distances(points, surface) < 0
+    united = covered.mean() * float(np.prod(high - low)) / volume
+    outside = float((covered & ~own).sum() / covered.sum())
+    return RodError(case, len(fibres), radius, float(covered[own].mean()), outside, max(0.0, 1 - united))
+
+
 def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionError]:
     """Each source of fibres of a case against the Laplace field's and, where a file has some, against those."""
     found = {
@@ -181,8 +201,9 @@ def variants(case: MuscleCase) -> dict[str, MuscleCase]:
         found[LAPLACE] = Fibres(traced=Traced(count=COUNT, start=start, end=end))
         template = KohoutKukacka(count=COUNT, start=start, end=end, contours=CONTOURS, template="parallel")
         found["Kohout and Kukacka"] = Fibres(kohout_kukacka=template)
+        found["CHMD"] = Fibres(chmd=Chmd(count=COUNT, around=Traced(count=AROUND, start=start, end=end)))
     if (given := case.fibres.polylines) is not None:
-        found["CHMD"] = Fibres(chmd=Chmd(count=COUNT, heads=(given,)))
+        found["CHMD of the file"] = Fibres(chmd=Chmd(count=COUNT, heads=(given,)))
         found["file"] = case.fibres
     return {name: case.model_copy(update={"fibres": fibres}) for name, fibres in found.items()}
 
@@ -207,14 +228,14 @@ def compared(
 
 def crossings(lines: Polylines) -> int:
     """The number of pairs of lines that come nearer than 0.2 mm to each other between their ends."""
-    inner = [_inner(lines.points[low:high]) for low, high in pairwise(lines.offsets)]
+    inner = [_along(lines.points[low:high], _ENDS) for low, high in pairwise(lines.offsets)]
     numbers: Ints = np.repeat(np.arange(len(inner)), _LOOKED_AT)
     near = cKDTree(np.concatenate(inner)).query_pairs(NEAR, output_type="ndarray")
     pairs = np.sort(numbers[near], axis=1)
     return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
 
 
-def _inner(line: Floats) -> Floats:
-    """Points (400, 3) along a ``line`` (k, 3) without its ends."""
-    at = np.linspace(_ENDS, 1 - _ENDS, _LOOKED_AT) * (len(line) - 1)
+def _along(line: Floats, left_out: float = 0.0) -> Floats:
+    """Points (400, 3) along a ``line`` (k, 3), of which the share ``left_out`` at either end is not looked at."""
+    at = np.linspace(left_out, 1 - left_out, _LOOKED_AT) * (len(line) - 1)
     return np.stack([np.interp(at, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)

@@ -7,6 +7,7 @@ from fem_reference.assessment.estimation import (
     Estimation,
     FitError,
     HeightError,
+    RodError,
 )
 from fem_reference.geometry.curves import TECHNIQUES
 
@@ -26,7 +27,8 @@ def found() -> Estimation:
     answer = AnswerChange("one", "CHMD", "Laplace field", "converged", changes, bars)
     lost = AnswerChange("one", "file", "Laplace field", "diverged", {}, bars)
     missing = {"lost": "why it was"}
-    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, (beside,), (answer, lost))
+    rods = RodError("one", 20, 2.93, 0.64, 0.18, 0.22)
+    return Estimation(tuple(curves), tuple(heights), tuple(fits), missing, (beside,), (answer, lost), (rods,))
 
 
 def test_numbers_are_counted_for_vertices_and_gaussians() -> None:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.geometry.surface_fibres import between
+from fem_reference.geometry.surface_fibres import between, outermost
 
 ANGLES = np.array([0.0, 0.9, 2.0, 3.1, 4.0, 5.2])
 
@@ -69,3 +69,60 @@ def test_fibres_that_meet_are_no_obstacle() -> None:
 def test_two_surface_fibres_are_too_few() -> None:
     with pytest.raises(InputError, match=r"heads\[0\].*2 surface fibres.*three or more"):
         between([_lines(*_cylinder()[:2])], 5)
+
+
+def _spindle(out: float, turn: float) -> np.ndarray:
+    """A fibre of a spindle of 50 mm about the z axis, half as thick at its ends as in its middle, of radius ``out`` [mm]."""
+    heights = np.linspace(0, 50, 200)
+    radii = out * (1 + np.sin(np.pi * heights / 50)) / 2
+    return np.column_stack([radii * np.cos(turn), radii * np.sin(turn), heights])
+
+
+def test_fibres_between_those_on_a_spindle_are_those_inside_it() -> None:
+    """Inside, fibres are at the same share of the radius in each section: where 8 mm thick, and 4 mm at the ends.
+
+    Twelve fibres on the surface; splines between them leave the circle by less than 1 %.
+    """
+    found = between([_lines(*(_spindle(8.0, turn) for turn in np.arange(12) * np.pi / 6))], 25).points.reshape(
+        25, 40, 3
+    )
+    shares = np.linalg.norm(found[:, :, :2], axis=2) / (4 * (1 + np.sin(np.pi * found[:, :, 2] / 50)))
+    assert np.ptp(shares, axis=1).max() < 0.01
+    assert shares.min() < 0.2
+    assert shares.max() > 0.9
+
+
+def _flat(across: np.ndarray) -> list[np.ndarray]:
+    """Straight lines of 50 mm along z at places ``across`` (k, 2), which are four times as wide as thick."""
+    heights = np.linspace(0, 50, 12)
+    return [np.column_stack([np.tile(place * [4, 1], (12, 1)), heights]) for place in across]
+
+
+def test_the_outermost_lines_are_on_all_sides_of_a_flat_section() -> None:
+    """Rings of 24 lines: of 12 outermost all are of the outer one, and on a circle where the section is drawn as one."""
+    turns = np.arange(24) * np.pi / 12
+    rings = np.concatenate([radius * np.column_stack([np.cos(turns), np.sin(turns)]) for radius in (2, 5, 8)])
+    found = outermost(_lines(*_flat(rings)), 12)
+    places = found.points.reshape(12, 40, 3)[:, 20, :2] / [4, 1]
+    assert_allclose(np.linalg.norm(places, axis=1), 8, rtol=1e-9)
+    around = np.sort(np.arctan2(places[:, 1], places[:, 0]))
+    assert np.diff(around).max() < np.pi / 3  # a sector of 30 degrees on either side of one without a line, at most
+
+
+def test_order_place_and_size_do_not_matter_to_the_outermost() -> None:
+    rng, turn = np.random.default_rng(5), Rotation.random(rng=np.random.default_rng(2))
+    lines = _flat(rng.normal(size=(60, 2)))
+    moved = [3 * turn.apply(lines[i]) + 100 for i in rng.permutation(60)]
+    moved[7:] = [line[::-1] for line in moved[7:]]
+    found, again = (outermost(_lines(*some), 10).points.reshape(-1, 40, 3)[:, 20] for some in (lines, moved))
+    there = 3 * turn.apply(found) + 100
+    assert len(found) == len(again) == 10
+    assert_allclose(
+        np.linalg.norm(there[:, None] - again, axis=2).min(axis=1), 0, atol=4
+    )  # of one line, halfway to a step
+
+
+def test_lines_on_one_surface_have_no_outside() -> None:
+    lines = _lines(*_flat(np.column_stack([np.arange(9.0), np.zeros(9)])))
+    with pytest.raises(InputError, match="lines on one surface"):
+        outermost(lines, 6)

@@ -439,6 +439,18 @@ def test_fibres_between_those_in_files_are_a_source(bar) -> None:
     assert anatomy.lean(case, np.array([0, 0, 1.0])) == pytest.approx(0, abs=1e-9)
 
 
+def test_fibres_between_the_outermost_of_a_field_are_a_source(bar) -> None:
+    """In a bar they are straight, as long as it is, and lean nowhere; by either flux."""
+    box = shapes.box((3, 3, 8), (10.0, 10.0, 40.0))
+    for flux in (None, "area"):
+        around = {"count": 8, "start": "bottom", "end": "top", "flux": flux}
+        case = casefile.read(bar).model_copy(update={"fibres": Fibres(chmd={"count": 6, "around": around})})
+        found, _ = anatomy.fibres_of(case, shapes.skin(box), lambda _: box)
+        assert found.lengths() == pytest.approx(np.full(6, 40.0))
+        assert np.ptp(found.points[:, :2]) > 4
+        assert anatomy.lean(case, np.array([0, 0, 1.0])) == 0
+
+
 BALL = shapes.sphere(3, 30.0)
 ANGLES = np.linspace(0, 2 * np.pi, 9)[:-1]
 LANDMARKS = 10 * np.column_stack([np.cos(ANGLES), np.sin(ANGLES), np.zeros(8)])

@@ -20,6 +20,7 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert text.count("<svg") == 4
     assert "Decompositions into fibres" in text
     assert numbers["decompositions"][0]["source"] == "CHMD"
+    assert "<td>20</td><td>2.93</td><td>64 %</td><td>18 %</td><td>22 %</td>" in text
     assert [one["status"] for one in numbers["answers"]] == ["converged", "diverged"]
     assert all(word in text for word in ("0.123", "0.0789", "4.56", "file: diverged"))
     assert "why it was" in text

@@ -52,3 +52,11 @@ def test_there_is_one_source(bar: Path) -> None:
 
 def test_heads_are_needed(bar: Path) -> None:
     refused(bar, "fibres", {"chmd": {"count": 3, "heads": []}}, "heads")
+
+
+def test_fibres_on_the_surface_are_of_files_or_of_a_field_between_attachments(bar: Path) -> None:
+    around = {"count": 12, "start": "start", "end": "end"}
+    ends = changed(bar, "fibres", {"chmd": {"count": 3, "around": around}}).fibres.ends
+    assert ends == {"fibres.chmd.around.start": "start", "fibres.chmd.around.end": "end"}
+    refused(bar, "fibres", {"chmd": {"count": 3}}, 'exactly one of "heads" and "around"')
+    refused(bar, "fibres", {"chmd": {"count": 3, "around": around | {"end": "nowhere"}}}, "nowhere")

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes import casefile
 from fem_reference.studies import estimation
-from fem_reference.studies.estimation import answers, compared, crossings
+from fem_reference.studies.estimation import answers, compared, crossings, of_rods
 
 
 def fibres(*lines: np.ndarray) -> Polylines:
@@ -103,6 +103,27 @@ def test_angle_length_and_share_outside_are_those_of_lines() -> None:
     assert found.crossings == 0
 
 
+def test_rods_fill_what_their_radius_reaches() -> None:
+    """One rod along a bar of 20 x 20 x 60 mm has a radius of 11.28 mm, which the sides cut off: four segments of its circle.
+
+    Half an angle of each is acos(10 / r). Half balls beyond its ends are outside too. Within 1 % at random points.
+    """
+    lines = _lines(_line(0, 60, (10, 10, 0)))
+    found = of_rods("bar", BOX, lines)
+    radius = 20 / np.sqrt(np.pi)
+    half = np.arccos(10 / radius)
+    inside = 1 - 4 * radius**2 * (half - np.sin(half) * np.cos(half)) / 400
+    union = 400 * 60 + 4 / 3 * np.pi * radius**3
+    assert (found.rods, found.radius) == (1, pytest.approx(radius))
+    assert found.filled == pytest.approx(inside, abs=0.01)
+    assert found.outside == pytest.approx(1 - inside * 400 * 60 / union, abs=0.01)
+    twice = of_rods("bar", BOX, _lines(_line(0, 60, (10, 10, 0)), _line(0, 60, (10, 10, 0))))
+    assert twice.radius == pytest.approx(radius / np.sqrt(2))
+    assert twice.overlap == pytest.approx(
+        1 / 2 - 2 / 3 * twice.radius / 60, abs=0.02
+    )  # one rod with round ends, of two
+
+
 def test_lines_that_cross_are_counted_once_a_pair() -> None:
     crossing = _lines(_line(0, 40, (10, 5, 0)), _line(20, 40, (3, 5, 0)), _line(0, 40, (10, 15, 0)))
     assert crossings(crossing) == 1
@@ -116,7 +137,7 @@ def test_the_same_fibres_change_no_answer_and_others_do(tmp_path, monkeypatch) -
     own = estimation.variants
     monkeypatch.setattr(estimation, "variants", lambda one: (found := own(one)) | {"again": found["Laplace field"]})
     found = {one.source: one for one in answers(case, tmp_path / "runs")}
-    assert set(found) == {"Kohout and Kukacka", "again"}
+    assert set(found) == {"Kohout and Kukacka", "CHMD", "again"}
     assert found["again"].status == "converged"
     assert max(found["again"].changes.values()) == 0
     assert {"surface_deviation.rms", "fibre_length.max", "joint_moment.force"} <= set(found["again"].changes)
