@@ -127,7 +127,7 @@ class Energy(Effect):
         """Energy per rest volume [MPa] at ``state``, of a point that is wholly in its region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
-    def local_energy(self, state: State) -> Any:
+    def weighted(self, state: State) -> Any:
         """Energy per rest volume [MPa] at ``state``, by the share of the point in its region."""
         return state.share(self.region) * self.energy(state) if self.region else self.energy(state)
 
@@ -208,9 +208,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
-    return sum(
-        effect.local_energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy)
-    )
+    return sum(law.weighted(replace(state, amount=amount)) for law, amount in acting if isinstance(law, Energy))
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:

@@ -11,7 +11,7 @@ from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, check_closed, enclosed_volume, place_of
 from fem_reference.foundations.records import join
 from fem_reference.geometry.fibres import fibre_field
-from fem_reference.geometry.regions import Along, Blended, Depth, Inside, Near, Region, Union, samples
+from fem_reference.geometry.regions import Around, Between, Blended, Depth, Inside, Region, Union, samples
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.io import files
 from fem_reference.problems.anatomy import field_mesh
@@ -40,16 +40,16 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
             attached_shares(rest.surface, one.vertices) for one in rest.attached if one.attachment == near.name
         )
         whole = shares.all(axis=1) if shares.all(axis=1).any() else shares.any(axis=1)
-        return Near(Surface(rest.surface.points, rest.surface.triangles[whole]), near.length)
+        return Around(Surface(rest.surface.points, rest.surface.triangles[whole]), near.length)
     if (patch := region.patch) is not None:
-        return Near(files.read_surface(case.file(patch.file, f"{key}.patch.file"), patch.unit), patch.depth)
+        return Around(files.read_surface(case.file(patch.file, f"{key}.patch.file"), patch.unit), patch.depth)
     if (closed := region.surface) is not None:
         place = join(case.place, f"{key}.surface.file")
         given = files.read_surface(case.file(closed.file, f"{key}.surface.file"), closed.unit)
         return Inside(check_closed(Surface(given.points, given.triangles, f"{place}: {given.place}")))
     share = region.field
     assert share is not None  # a CaseRegion record has one of the four
-    return Along(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
+    return Between(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
 
 
 def facts(rest: Setup) -> dict[str, str]:
