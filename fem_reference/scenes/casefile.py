@@ -172,6 +172,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     case: Case = parse(record, table | whose, place)
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     check_once(runs, join(place, "candidate"))
+    case.check_solvers()
     check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     return _checked(case)
 
