@@ -189,6 +189,10 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
             raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
+        if entry.anchor is not None and (isinstance(entry.on, str) or len(entry.components) < 3):
+            raise InputError(
+                f"{place}.anchor", said(entry.anchor), "None, or springs at points of a skin along all axes"
+            )
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:

@@ -88,6 +88,7 @@ def test_components_are_axes(components) -> None:
         ({"path": lambda *_: "no"}, '"top": path at frame 0: got ValueError'),
         ({"stiffness": -1.0}, r"prescribed\.top\.stiffness: got -1.0, want more than 0"),
         ({"stiffness": "1 N"}, r"prescribed\.top\.stiffness: got 1 N, want more than 0"),
+        ({"anchor": (0.0, 0.0, 9.0)}, r"prescribed\.top\.anchor: got .*, want None, or springs at points of a skin"),
     ],
 )
 def test_what_is_prescribed_is_a_path_of_a_region(changes, message) -> None:
