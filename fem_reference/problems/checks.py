@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, Load
+from fem_reference.effects import Effect, Load, in_situ
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
@@ -240,9 +240,13 @@ def _check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where two regions prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed. They are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where two regions prescribe different exact displacements at shared places, a path of motion cannot be
+    followed, or a tendon is beside tension at rest. Regions are compared at all frames, all stops, and the middles between them.
     """
+    if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
+        raise InputError(
+            "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
+        )
     ends = np.unique([*body.frames, *body.stops])
     sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem_reference.effects import Effect, in_situ
+from fem_reference.effects import Effect
 from fem_reference.effects.tendon import Tendon
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, TetMesh
@@ -26,17 +26,13 @@ def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect
     """The springs of each effect ``tendon`` among ``effects``, of a set-up ``rest`` filled with a ``mesh`` and ``fibres``."""
     for effect in effects:
         if isinstance(effect, Tendon):
-            yield _springs(effect, rest, mesh, fibres, in_situ.among(effects) is not None)
+            yield _springs(effect, rest, mesh, fibres)
 
 
-def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines, tense: bool) -> Prescribed:
-    """The springs of an ``effect``; InputError where no fibre goes on by its tendon, or the muscle is ``tense`` at rest."""
+def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> Prescribed:
+    """The springs of an ``effect``; InputError where no fibre goes on by its tendon."""
     number = [one.attachment for one in rest.attached].index(effect.on)
     entry, place = rest.attached[number], f"effect {effect.title}"
-    if tense:
-        raise InputError(
-            place, "it beside in_situ", "a muscle without tension at rest: what a taut tendon balances is unknown"
-        )
     if entry.tendon is None:
         raise InputError(place, f'the attachment "{effect.on}" without a tendon', "landmarks that it goes to")
     ends = attached_ends(rest.attached, rest.exempt, fibres)

@@ -60,5 +60,3 @@ def test_a_tendon_of_nothing_is_refused() -> None:
         springs(bar(), TENDON, lines=reaching)
     with pytest.raises(InputError, match=r"Tendon on top\.reach: got 0\.1 mm, within which no triangle is free"):
         springs(bar(), make("tendon", on="top", stiffness="20 N/mm", reach="0.1 mm"))
-    with pytest.raises(InputError, match="Tendon on top: got it beside in_situ"):
-        springs(bar(), TENDON, make("in_situ", stretch=1.1))
