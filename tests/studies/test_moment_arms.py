@@ -81,6 +81,15 @@ def test_the_hip_goes_from_rest_back_and_on_by_a_hundredth_of_a_radian_a_frame(f
 
 
 @pytest.mark.slow
+def test_a_run_that_ends_before_1_rad_is_no_evidence(tmp_path: Path) -> None:
+    short = moment_arms.ArmStudy("hip_flexion", 25.0, (0.0, 0.2), "gluteus_medius", "extension", ())
+    with pytest.raises(
+        InputError, match="hip_flexion: got all 3 frames reached, want a reference that reaches a flexion of 1"
+    ):
+        list(moment_arms.of_case(short, tmp_path / "runs"))
+
+
+@pytest.mark.slow
 def test_arms_of_a_solved_case_are_those_of_the_metric(tmp_path: Path) -> None:
     """At the middle frames, where the metric's parabola through three and the polynomial through six agree to some per cent."""
     from fem_reference.metrics import context_of
