@@ -57,6 +57,7 @@ from fem_reference.problems.fibre_ends import attached_ends, completed
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
+from fem_reference.problems.tendons import pulling
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.
@@ -113,7 +114,7 @@ class MuscleProblem(Setup):
         taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
         free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
         cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-        prescribed = []
+        prescribed = list(pulling(self, mesh, self.fibres, self.effects))
         for entry in self.attached:
             name, path = entry.attachment, Follows(From(first, entry.bone.pose))
             prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, FieldEffect, Load, Ramped, in_situ, moduli, name_of
+from fem_reference.effects import Effect, Energy, FieldEffect, Ramped, in_situ, moduli, name_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -239,7 +239,7 @@ def _check_names(case: MuscleCase) -> None:
     check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
     check_used(attachments, list(case.fibres.ends.items()), case.place)
     _check_forces(case)
-    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(case.effects) if isinstance(effect, Load)]
+    loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
     check_used([*attachments, FREE], loads, case.place)
     regions.check(case.region, case.effects, attachments, case.place)
 

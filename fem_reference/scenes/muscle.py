@@ -199,7 +199,7 @@ class Landmarks(Record):
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
     bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
-    a straight ``tendon`` to a point of the bone: in their lengths only, it does not pull.
+    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` lets it pull.
     """
 
     name: Name
