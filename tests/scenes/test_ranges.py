@@ -59,7 +59,7 @@ def test_another_way_to_write_a_key_is_no_other_key(bar: Path, again: str) -> No
     ["attachment[0].within", "bone[1].motion.keyframes[1].angle", "muscle.tet_size", "frames.interval"],
 )
 def test_what_runs_are_measured_with_is_not_varied(bar: Path, key: str) -> None:
-    message = f'uncertain[0].key: got "{key}", want a number of an effect, or the stiffness of an attachment'
+    message = f'uncertain[0].key: got "{key}", want a number of an effect, the stiffness or outline.shift.by of'
     refused(bar, "uncertain", [MU | {"key": key}], message)
 
 
