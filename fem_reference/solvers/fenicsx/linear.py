@@ -94,11 +94,10 @@ class Factorised:
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
-            options["pc_precision"] = (
-                self.precision
-            )  # read here alone; PETSc warns at its end of an option that nothing has read
+            # Read here alone; PETSc warns at its end of an option that nothing has read.
+            options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
-            del options["pc_precision"]
+            options.delValue("pc_precision")
             self.preconditioner.setReusePreconditioner(True)
         self.spent.counts["factorisations"] += 1
         if self.factors.getMumpsInfog(_ERROR) < 0:
