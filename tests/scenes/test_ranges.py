@@ -22,7 +22,7 @@ def test_an_effect_states_its_ranges_and_a_case_its_own_in_their_place(bar: Path
     own = casefile.read(bar, changes={"uncertain": [MU, bulk]})
     assert list(ranges.ranges(own)) == ["effect[0].mu", "effect[1].bulk"]
     assert ranges.ends(own, key, ranges.ranges(own)[key], "here") == pytest.approx((0.02, 0.04))
-    assert own.key == case.key, "what nobody knows changes no solution"
+    assert own.key == case.key, "ranges change no solution"
 
 
 @pytest.mark.parametrize(

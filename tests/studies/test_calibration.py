@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import stand_ins
 
+import fem_reference as fr
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies import calibration
 from fem_reference.studies.calibration import calibrate, chosen, unit_of
 from fem_reference.studies.campaign import Workers, shared_bench
 from fem_reference.studies.unknowns import unknowns
@@ -53,6 +53,10 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     assert mu.high - mu.low < 0.1 * mu.value
     assert mu.is_known
     assert found.runs < 16
+    lines: list[str] = []
+    called = fr.calibrate(case, str(path), ["effect.0.mu"], store=tmp_path / "runs", progress=lines.append)
+    assert called == found, "the call of the package is the same, from stored runs"
+    assert any("solved before" in line for line in lines)
     both = calibrate(case, path, [MU, C1], tmp_path / "runs", Workers())
     ((one, other, correlation),) = both.pairs
     assert (one, other) == ("neo_hooke mu", "mooney_rivlin c1")
@@ -117,4 +121,3 @@ def test_only_a_number_with_a_range_is_fitted(case: MuscleCase, tmp_path: Path) 
         chosen(unknowns(case), [])
     with pytest.raises(InputError, match=r"row 2: frame: got 7, want one of the case: 0 to 20, every 5"):
         calibrate(case, data(tmp_path, "7,force.lid,1,N,1"), [MU], tmp_path / "runs", Workers())
-    assert calibration.calibrate is calibrate
