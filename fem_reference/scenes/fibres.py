@@ -63,7 +63,7 @@ class Chmd(Record):
     heads: tuple[PolylineFile, ...] = Field(min_length=1)
 
 
-class Turn(Record):
+class FibreTurn(Record):
     """A rotation about an ``axis``, right-handed, by an ``angle``."""
 
     axis: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name="an axis"))]
@@ -85,7 +85,7 @@ class Fibres(Record):
     kohout_kukacka: KohoutKukacka | None = None
     chmd: Chmd | None = None
     complete: bool = False
-    turned: Turn | None = None
+    turned: FibreTurn | None = None
 
     _check = one_of("polylines", "traced", "kohout_kukacka", "chmd")
 

@@ -32,7 +32,7 @@ from fem_reference.problems.anatomy import draped, facets_under, fan, pick
 from fem_reference.problems.estimates import estimates
 from fem_reference.problems.fibre_ends import REACHES, attached_ends, ends_of
 from fem_reference.scenes import casefile
-from fem_reference.scenes.fibres import Fibres, Turn
+from fem_reference.scenes.fibres import Fibres, FibreTurn
 from fem_reference.scenes.muscle import Attachment, MuscleCase, Shift
 
 BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
@@ -412,7 +412,7 @@ def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:
     assert lines.lengths() == pytest.approx(40, rel=1e-2)
     places = np.zeros(2, int), np.array([[5.0, 5, 20], [3, 4, 11]])
     assert direction(*places) == pytest.approx(np.tile([0.0, 0, 1], (2, 1)), abs=1e-6)
-    turned = Turn(axis=(-2, 0, 0), angle="30 deg")  # right-handed: z goes to y
+    turned = FibreTurn(axis=(-2, 0, 0), angle="30 deg")  # right-handed: z goes to y
     leaning = case.model_copy(update={"fibres": case.fibres.model_copy(update={"turned": turned})})
     same, direction = anatomy.fibres_of(leaning, surface, fill)
     assert np.array_equal(same.points, lines.points), "what is measured stays"

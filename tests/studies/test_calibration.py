@@ -66,6 +66,20 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     assert mu.value + 2 * c1.value == pytest.approx(found.estimates[0].value + 2 * 0.003, rel=1e-3)
 
 
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_a_modulus_is_inside_its_interval_in_19_of_20_trials_by_the_reference(case: MuscleCase, tmp_path: Path) -> None:
+    """Twenty seeds of 1 % of noise; the same by a law alone, and of 40 seeds, is in tests/assessment/test_calibration.py."""
+    truth = shared_bench(unknowns(case).at({MU: 0.011}), tmp_path / "runs").reference()
+    forces, inside = np.linalg.norm(truth.force("lid"), axis=1), 0
+    for seed in range(20):
+        noise = 1 + 0.01 * np.random.default_rng(seed).standard_normal(4)
+        rows = [f"{5 * i},force.lid,{forces[i] * noise[i - 1]:.9g},N,{0.01 * forces[i]:.9g}" for i in range(1, 5)]
+        (mu,) = calibrate(case, data(tmp_path, *rows), [MU], tmp_path / "runs", Workers()).estimates
+        inside += mu.low < 0.011 < mu.high
+    assert inside >= 19
+
+
 def test_a_run_that_diverges_is_named_with_its_values(
     case: MuscleCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
