@@ -52,12 +52,13 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 def unshifted(case: MuscleCase) -> MuscleCase:
     """The case whose attachments are where their landmarks are: itself where no outline is shifted."""
-    entries = []
-    for one in case.attachment:
-        moved = one.outline is not None and one.outline.shift is not None and one.outline.shift.by != 0
-        plain = one.outline.model_copy(update={"shift": None}) if one.outline and moved else one.outline
-        entries.append(one.model_copy(update={"outline": plain}) if moved else one)
-    return case if tuple(entries) == case.attachment else case.model_copy(update={"attachment": tuple(entries)})
+    still = tuple(
+        one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
+        if one.outline and one.outline.shift and one.outline.shift.by
+        else one
+        for one in case.attachment
+    )
+    return case if still == case.attachment else case.model_copy(update={"attachment": still})
 
 
 def tendon_of(case: MuscleCase, i: int) -> Floats | None:
