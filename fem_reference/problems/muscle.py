@@ -42,7 +42,7 @@ from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import regions
-from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of
+from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
@@ -167,11 +167,12 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
-    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    own = rest if (plain := unshifted(case)) is case else setup(plain)
+    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, own))
+    ends = attached_ends(own.attached, own.exempt, fibres)
     if case.fibres.complete and ends is not None:
         fibres = inside(rest.surface, completed(fibres, ends))
-        ends = attached_ends(rest.attached, rest.exempt, fibres)
+        ends = attached_ends(own.attached, own.exempt, fibres)
     asked = (*case.effects, *(one.effect for one in case.decisions))
     needed = fibre if any("fibre" in effect.needs for effect in asked) else None
     problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))

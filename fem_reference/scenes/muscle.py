@@ -179,13 +179,23 @@ class VertexList(Record):
     value: int | None = None
 
 
+class Shift(Record):
+    """A displacement ``by`` a distance ``along`` a direction."""
+
+    along: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))]
+    by: Length
+
+
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone."""
+    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone. With
+    a ``shift`` the landmarks are elsewhere; the fibres are those of the attachments without it.
+    """
 
     file: str
     unit: LengthUnit
     clouds: tuple[str, ...] = Field(min_length=1)
     reach: PositiveLength
+    shift: Shift | None = None
 
 
 class Landmarks(Record):
