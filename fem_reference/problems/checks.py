@@ -171,7 +171,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
-    names = [entry.name for entry in prescribed]
+    names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
