@@ -131,6 +131,8 @@ class Prescribed:
     reaction force is reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a
     picklable callable of rest points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm].
     ``stiffness`` [MPa/mm] of springs over the area that pull towards the path; None: exact. A skin has springs only.
+    ``anchor`` [mm]: the rest place of a point on the path, to which all springs of a skin go as straight tendons: each pulls along
+    its line while that is longer than at rest.
     """
 
     name: str
@@ -138,6 +140,7 @@ class Prescribed:
     components: tuple[int, ...]
     path: Callable[[Floats, float], Floats]
     stiffness: float | None = None
+    anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
         """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it has none."""

@@ -12,7 +12,7 @@ from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import regions
+from fem_reference.problems import regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -171,7 +171,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
-    names = [entry.name for entry in prescribed]
+    names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
@@ -189,6 +189,10 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
             raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
+        if entry.anchor is not None and (isinstance(entry.on, str) or len(entry.components) < 3):
+            raise InputError(
+                f"{place}.anchor", said(entry.anchor), "None, or springs at points of a skin along all axes"
+            )
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
@@ -234,11 +238,12 @@ def _check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where laws leave a part of the body without (``regions.check``), two regions of its surface prescribe
-    different exact displacements at shared places, or a path of motion cannot be followed. They are compared at all frames, all
-    stops, and the middles between them.
+    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon is beside tension at rest, two
+    regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be followed. They
+    are compared at all frames, all stops, and the middles between them.
     """
     regions.check(body)
+    tendons.check(body)
     ends = np.unique([*body.frames, *body.stops])
     sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]

@@ -42,7 +42,7 @@ from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import regions
-from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of
+from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
@@ -57,10 +57,10 @@ from fem_reference.problems.fibre_ends import attached_ends, completed
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
+from fem_reference.problems.tendons import pulling
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
-# Frame numbers before the first over which an overlap at rest is removed.
-RELAXING = 10
+RELAXING = 10  # frame numbers before the first over which an overlap at rest is removed
 
 
 def kept_meshes() -> Path | None:
@@ -113,7 +113,7 @@ class MuscleProblem(Setup):
         taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
         free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
         cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-        prescribed = []
+        prescribed = list(pulling(self, mesh, self.fibres, self.effects))
         for entry in self.attached:
             name, path = entry.attachment, Follows(From(first, entry.bone.pose))
             prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
@@ -166,11 +166,12 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
-    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    own = rest if (plain := unshifted(case)) is case else setup(plain)
+    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, own))
+    ends = attached_ends(own.attached, own.exempt, fibres)
     if case.fibres.complete and ends is not None:
         fibres = inside(rest.surface, completed(fibres, ends))
-        ends = attached_ends(rest.attached, rest.exempt, fibres)
+        ends = attached_ends(own.attached, own.exempt, fibres)
     asked = (*case.effects, *(one.effect for one in case.decisions))
     needed = fibre if any("fibre" in effect.needs for effect in asked) else None
     problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
@@ -213,9 +214,8 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
-    blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
-    mesh = block.fill(rest.surface, size) if blocks else filled(rest.surface, size)
+    mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
     if set(mesh.facets) == set(shares):
         return mesh
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})

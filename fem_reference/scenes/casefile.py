@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect, Load, Ramped, in_situ, moduli, name_of, region_of
+from fem_reference.effects import Effect, FieldEffect, Ramped, in_situ, moduli, name_of, region_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -172,6 +172,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     case: Case = parse(record, table | whose, place)
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     check_once(runs, join(place, "candidate"))
+    case.check_solvers()
     check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     return _checked(case)
 
@@ -238,7 +239,7 @@ def _check_names(case: MuscleCase) -> None:
     check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
     check_used(attachments, list(case.fibres.ends.items()), case.place)
     _check_forces(case)
-    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(case.effects) if isinstance(effect, Load)]
+    loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
     check_used([*attachments, FREE], loads, case.place)
     regions.check(case.region, case.effects, attachments, case.place)
 

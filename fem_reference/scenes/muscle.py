@@ -160,9 +160,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into
-    eight (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of
-    boxes, each cut into six (``"block"``).
+    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each is then cut into eight (``refinements``),
+    and the ``mesher``: good tetrahedra (``"quality"``), or of a box along the axes a grid, each box cut into six (``"block"``).
     """
 
     surface: str
@@ -179,13 +178,23 @@ class VertexList(Record):
     value: int | None = None
 
 
+class Shift(Record):
+    """A displacement ``by`` a distance ``along`` a direction."""
+
+    along: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))]
+    by: Length
+
+
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone."""
+    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone. With
+    a ``shift`` the landmarks are elsewhere; the fibres are those of the attachments without it.
+    """
 
     file: str
     unit: LengthUnit
     clouds: tuple[str, ...] = Field(min_length=1)
     reach: PositiveLength
+    shift: Shift | None = None
 
 
 class Landmarks(Record):
@@ -199,7 +208,7 @@ class Landmarks(Record):
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
     bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
-    a straight ``tendon`` to a point of the bone: in their lengths only, it does not pull.
+    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` lets it pull.
     """
 
     name: Name

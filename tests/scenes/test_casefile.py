@@ -94,6 +94,11 @@ WRONG = [
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
     ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
     (
+        "effect[1]",
+        {"name": "tendon", "on": "top", "stiffness": "1 N/mm", "reach": "1 mm"},
+        'effect[1].on: got "top", want one of start, end, free',
+    ),
+    (
         "effect[0]",
         PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
         "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",

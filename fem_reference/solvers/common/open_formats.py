@@ -3,7 +3,8 @@
 import csv
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,11 @@ from fem_reference.effects import Effect, name_of, region_of
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
+from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.io import files
 from fem_reference.io.soup import rows
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.problems.setup import Bone
 
 UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
 CONVENTIONS = {
@@ -25,8 +27,8 @@ CONVENTIONS = {
 }
 
 
-def write(case: MuscleCase, problem: MuscleProblem, folder: Path) -> None:
-    """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
+def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
+    """Every file of the export of a ``problem`` but those that explain it, into ``folder``; ``of``: facts that name its case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
@@ -38,7 +40,7 @@ def write(case: MuscleCase, problem: MuscleProblem, folder: Path) -> None:
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
     write_lines(folder / "fibres.vtk", problem.fibres)
     _write_tables(problem, folder)
-    files.write_text(folder / "scene.json", json.dumps(facts(case, problem), indent=1, allow_nan=False))
+    files.write_text(folder / "scene.json", json.dumps({**of, **facts(problem)}, indent=1, allow_nan=False))
 
 
 def bone_files(problem: MuscleProblem) -> list[str]:
@@ -69,19 +71,16 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
     files.write_text(path, text.getvalue())
 
 
-def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that no mesh file has: units, conventions, frames, bones, attachments, regions, effects with the unit of
-    every parameter.
+def facts(problem: MuscleProblem) -> dict[str, Any]:
+    """The facts that no mesh file has: units, conventions, frames, bones, attachments, names of regions (their shares are in the
+    files of tets), effects with the unit of every parameter.
     """
     contact = problem.contact
     bones = [
-        entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
-        | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
-        for entry, name, bone in zip(case.bone, bone_files(problem), problem.bones, strict=True)
+        _bone(bone) | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
+        for bone, name in zip(problem.bones, bone_files(problem), strict=True)
     ]
     return {
-        "case": case.name,
-        "title": case.title,
         "written_by": f"fem_reference {__version__}",
         "units": UNITS,
         "conventions": CONVENTIONS,
@@ -92,10 +91,23 @@ def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
             for attached in problem.attached
         ],
-        "regions": [region.model_dump(mode="json", exclude_none=True) for region in case.region],
+        "regions": list(problem.regions),
         "effects": [_effect(effect) for effect in problem.effects],
         "mesh": problem.mesh_facts,
     }
+
+
+def _bone(bone: Bone) -> dict[str, Any]:
+    """A bone as scene files describe it: its closed form, if it has one, its motion, and the errors of its distance [mm]."""
+    form = {name: asdict(bone.solid) for name, form in CLOSED_FORMS.items() if isinstance(bone.solid, form)}
+    found: dict[str, Any] = {"name": bone.name, **form}
+    if (motion := bone.motion) is not None:
+        turns, frames = motion.centre is not None, [float(frame) for frame in motion.frames]
+        amount = "angle" if turns else "distance"
+        along = {"axis": motion.axis, "centre": motion.centre} if turns else {"direction": motion.axis}
+        pairs = zip(frames, motion.amounts, strict=True)
+        found["motion"] = along | {"keyframes": [{"frame": frame, amount: value} for frame, value in pairs]}
+    return found | {"distance_error": bone.distance_error, "distance_rounding": bone.distance_rounding}
 
 
 def _effect(effect: Effect) -> dict[str, Any]:
