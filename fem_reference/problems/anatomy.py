@@ -204,8 +204,7 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
-    volume = enclosed_volume(surface.points, surface.triangles)
-    mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
+    mesh = field_mesh(surface, fill)
     traced, ends = case.fibres.traced, case.fibres.ends.values()
     if traced is not None and traced.flux == "area":
         flux = area_flux(mesh, *ends)
@@ -218,6 +217,11 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
     towards = None if asked.towards is None else np.array(asked.towards)
     lines = mapped(field, contours(field, asked.contours, towards), asked.count, asked.pennation or 0.0)
     return lines, NearestLine(lines)
+
+
+def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
+    """The tetrahedra in a closed ``surface`` for fields between attachments, by ``fill`` of a size [mm]."""
+    return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:

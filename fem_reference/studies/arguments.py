@@ -50,9 +50,9 @@ def check_changes(changes: object) -> None:
 
 
 def check_solver(solver: object, settings: Mapping[str, object]) -> None:
-    """Raise InputError unless ``solver`` is a name, or None without ``settings``."""
-    if solver is not None and not isinstance(solver, str):
-        raise InputError("solver", said(solver), "the name of a solver, or None")
+    """Raise InputError unless ``solver`` is a name or a function, or None without ``settings``."""
+    if solver is not None and not isinstance(solver, str) and not hasattr(solver, "__name__"):
+        raise InputError("solver", said(solver), "the name of a solver, a function, or None")
     if solver is None and settings:
         want = 'the name of the solver that they are of, such as solver="fenicsx"'
         raise InputError(f"settings {', '.join(settings)}", "no solver", want)
