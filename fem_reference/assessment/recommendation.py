@@ -57,7 +57,8 @@ class Margins:
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True where
-    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them.
+    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them; ``loads``: of all
+    settings, the share of the machine that other processes kept busy while they were timed.
     """
 
     best: Expected | None
@@ -66,6 +67,7 @@ class Recommendation:
     margins: Margins
     of: tuple[str, ...]
     measured: bool
+    loads: tuple[float, ...] = ()
 
 
 def recommend(
@@ -86,7 +88,8 @@ def recommend(
     rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
     best = min(fitting, key=rank, default=None)
     nearest = None if best else min(known, key=lambda one: one.misses(limits), default=None)
-    return Recommendation(best, nearest, len(known), margins, of, bool(own))
+    loads = tuple(one.point.load for one in known)
+    return Recommendation(best, nearest, len(known), margins, of, bool(own), loads)
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:

@@ -1,13 +1,17 @@
 """A recommended setting in words: as text and as JSON."""
 
+import math
+
+from fem_reference.assessment.fronts import LOADED
 from fem_reference.assessment.recommendation import Expected, Recommendation
 from fem_reference.report.study_page import title_of
-from fem_reference.report.words import duration, listed, number
+from fem_reference.report.words import duration, listed, number, under_load
 
 
 def facts(found: Recommendation, metric: str) -> dict[str, object]:
     """A recommendation as valid JSON."""
     best, near = found.best, found.nearest
+    one = best or near
     return {
         "metric": metric,
         "recommended": best and best.point.choice,
@@ -20,6 +24,8 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
         "measured_on": list(found.of),
         "margin_error": found.margins.error,
         "margin_time": found.margins.time,
+        "load_by_others": None if one is None or math.isnan(one.point.load) else one.point.load,
+        "timed_under_load": sum(load > LOADED for load in found.loads),
     }
 
 
@@ -40,6 +46,9 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
     if not found.measured:
         margins = found.margins
         lines.append(f"margins in it: {number(margins.error)} times the error, {number(margins.time)} times the time")
+    if warning := under_load(found.loads, LOADED):
+        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""
+        lines.append(f"{warning}{own}")
     return "\n".join(lines)
 
 

@@ -1,7 +1,7 @@
 """The page of a study: error against cost, the best solver at the same cost or error, the cost of half the error."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from fem_reference.assessment import cost_study, fronts
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
+from fem_reference.assessment.fronts import COSTS, LOADED, Match, Point, Price, levels, match, solvers
 from fem_reference.assessment.recommendation import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page, by_name
-from fem_reference.report.words import duration, listed, number
+from fem_reference.report.words import duration, listed, number, under_load
 from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
@@ -41,7 +41,7 @@ def page(study: Study) -> Page:
         "claims": lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         "transfers": moved,
         "losses": sorted(one.loss for one in moved),
-        **by_name(shown, solvers, front, sentences, matched, left_out, title_of, as_measured),
+        **by_name(shown, solvers, front, sentences, matched, left_out, title_of, as_measured, load_of),
     }
     one = cases[0] if len(cases) == 1 else None
     said = tuple(("" if one else case.case, "", text) for case in study.cases for text in sentences(case)[-1:])
@@ -103,6 +103,11 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
         )
         for points, cost, same, compared in asked
     ]
+
+
+def load_of(points: Iterable[Point]) -> str:
+    """A warning where times of ``points`` were measured on a machine that was busy with other work, else empty."""
+    return under_load((point.load for point in points if point.status == "converged"), LOADED)
 
 
 def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
@@ -185,6 +190,7 @@ def text(study: Study) -> str:
             known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
             lines.append(f"  {title_of(error)}{known}:")
             lines += [f"    {sentence}" for sentence in sentences(case, error)]
+        lines += [f"  {warning}" for warning in [load_of(case.points)] if warning]
         lines += [f"  left out: {one.solver}, {one.label}: {one.status}: {one.message}" for one in left_out(case)]
     lines += [f"left out: {case}: {why}" for case, why in study.missing.items()]
     return "\n".join(lines)

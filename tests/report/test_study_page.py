@@ -10,7 +10,7 @@ import pytest
 
 from fem_reference import report
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import Point, match
+from fem_reference.assessment.fronts import LOAD, Point, match
 from fem_reference.assessment.recommendation import recommend
 from fem_reference.report import study_page
 from tests.assessment.test_recommendation import RMS, TIME, features, own_study
@@ -227,3 +227,13 @@ def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     # At most 10 mm: 5 mm were measured in 3 ms; at most 2 mm: the truth.
     assert "0.00300 ssweeps = 3, 5 mm measured" in plain
     assert "reference, as it is, the truth itself" in plain
+
+
+def test_times_of_a_machine_that_was_busy_are_marked() -> None:
+    case = study()
+    timed = (replace(one, costs=one.costs | {LOAD: 0.25 if one.value == "4" else 0.05}) for one in case.points)
+    busy = Study((replace(case, points=tuple(timed)),))
+    warning = "2 of 8 times were measured while other processes kept 25 % of the machine busy"
+    assert warning in study_page.page(busy).html()
+    assert warning in study_page.text(busy)
+    assert warning not in study_page.text(Study((case,)))
