@@ -34,6 +34,14 @@ def is_of_body(reference: object, of: object) -> bool:
     return True
 
 
+def check_keys(keys: object) -> Sequence[str]:
+    """The keys; InputError unless they are a list of texts."""
+    listed = isinstance(keys, Sequence) and not isinstance(keys, str)
+    if not listed or not all(isinstance(key, str) for key in keys):
+        raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
+    return keys
+
+
 def check_changes(changes: object) -> None:
     """Raise InputError unless they are keys and values, or None."""
     keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fem_reference.effects import Effect, name_of
+from fem_reference.effects import Effect, Energy, name_of
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
@@ -34,6 +34,8 @@ def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
         files.write_surface(folder / name, bone.surface, bone.surface.points)
     along = {} if problem.directions is None else {"fibre": problem.directions}
+    middles = problem.mesh.points[problem.mesh.tets].mean(axis=1)
+    along |= {f"region_{name}": region(middles) for name, region in problem.regions.items()}
     for name in ("tets.vtu", "tets.msh"):
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
     write_lines(folder / "fibres.vtk", problem.fibres)
@@ -70,7 +72,9 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
 
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
+    """The facts that no mesh file has: units, conventions, frames, bones, attachments, names of regions (their shares are in the
+    files of tets), effects with the unit of every parameter.
+    """
     contact = problem.contact
     bones = [
         _bone(bone) | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
@@ -87,6 +91,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
             for attached in problem.attached
         ],
+        "regions": list(problem.regions),
         "effects": [_effect(effect) for effect in problem.effects],
         "mesh": problem.mesh_facts,
     }
@@ -109,7 +114,8 @@ def _effect(effect: Effect) -> dict[str, Any]:
     """The name of an effect, its law in words, and its parameters, each with its value and unit."""
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
-    return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters}
+    there = {"in": effect.region} if isinstance(effect, Energy) and effect.region else {}
+    return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters} | there
 
 
 def write_lines(path: Path, lines: Polylines) -> None:

@@ -10,6 +10,8 @@ import meshio
 import numpy as np
 import pytest
 
+from fem_reference.export import febio
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
@@ -114,4 +116,25 @@ def test_every_effect_can_be_stated(built: MuscleProblem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
     (printed,) = open_formats.facts(replace(built, effects=(effect,)))["effects"]
     assert printed["name"] == name
-    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
+    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys() - {
+        "region"
+    }
+
+
+def test_regions_are_exported_with_what_acts_in_them(scene: MuscleCase, built: MuscleProblem, tmp_path: Path) -> None:
+    table = {"name": "tendon", "width": "0 mm", "attachment": {"name": "origin", "length": "8 mm"}}
+    laws = [{"name": "neo_hooke", "mu": mu, "in": at} for mu, at in (("1 kPa", "not tendon"), ("1 MPa", "tendon"))]
+    volume = {"name": "incompressible", "bulk": "10 MPa"}
+    there = casefile.read_muscle(scene.folder, changes={"region": [table], "effect": [*laws, volume]})
+    problem = replace(built, effects=there.effects, regions=muscle.setup(there).regions)
+    open_formats.write(problem, tmp_path, {})
+    facts = json.loads((tmp_path / "scene.json").read_text())
+    assert [effect.get("in") for effect in facts["effects"]] == ["not tendon", "tendon", None]
+    assert facts["regions"] == ["tendon"]
+    middles = built.mesh.points[built.mesh.tets].mean(axis=1)
+    for name in ("tets.vtu", "tets.msh"):
+        found = meshio.read(tmp_path / name).cell_data["region_tendon"][0]
+        assert np.array_equal(found, problem.regions["tendon"](middles))
+    assert 0 < found.mean() < 0.5
+    with pytest.raises(InputError, match=r'effect\[0\]\.in: got "not tendon", want a law of the whole muscle'):
+        febio.check(there)
