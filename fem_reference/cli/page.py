@@ -13,8 +13,10 @@ from fem_reference.cli._cases import (
     changes,
     check_names,
     checked_bench,
+    command_parts,
     muscle_case,
     own_candidates,
+    own_solver,
     publish,
     status,
 )
@@ -53,13 +55,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solve", action="store_true", help=solving)
     size = f"for {TABLE} and {ESTIMATION}: cases at their sizes for quick solutions"
     parser.add_argument("--quick", action="store_true", help=size)
-    share(parser, "--set", "--error-bar", "--unit", "--name")
+    share(parser, "--set", "--error-bar", "--solver-command", "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
     takes, write = _PAGES[options.name]
-    for option in ("case", "candidate", "unit", "set", "quick", "error_bar", "solve"):
+    for option in ("case", "candidate", "unit", "solver_command", "set", "quick", "error_bar", "solve"):
         if getattr(options, option) and option not in takes:
             others = listed([name for name, (taken, _) in _PAGES.items() if option in taken])
             raise InputError("page", f"--{option.replace('_', '-')} for {options.name}", f"it for {others} only")
@@ -86,11 +88,15 @@ def _table(options: argparse.Namespace) -> int:
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+    own = own_solver(options)
+    for name in scenes if own else ():
+        foreign.setdefault(name, []).extend(own)
+        check_names([one.name for one in foreign[name]])
     with fenicsx.shared():
         table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign, error_bars=options.error_bar)
-    pairs = [(case, one) for case, found in foreign.items() for one in found]
+    pairs = [(case, one) for case, found in foreign.items() for one in found if one not in own]
     more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
-    asked = _asked(scenes.values(), options, more)
+    asked = _asked(scenes.values(), options, [*more, *command_parts(own)])
     publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
@@ -136,7 +142,7 @@ def _credibility(options: argparse.Namespace) -> int:
 
 
 _PAGES: dict[str, tuple[tuple[str, ...], Callable[[argparse.Namespace], int]]] = {
-    TABLE: (("case", "candidate", "unit", "set", "quick", "error_bar"), _table),
+    TABLE: (("case", "candidate", "unit", "solver_command", "set", "quick", "error_bar"), _table),
     CLAIMS: (("case",), _claims),
     ESTIMATION: (("case", "set", "quick", "solve"), _estimation),
     CREDIBILITY: ((), _credibility),

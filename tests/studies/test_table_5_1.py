@@ -2,6 +2,9 @@
 
 import json
 import math
+import shlex
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -135,6 +138,17 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     assert "3 threads" in html
     assert mine["worst"]["surface_deviation.rms"]["value"] == pytest.approx(0.25, abs=1e-4)  # files of single precision
     assert "Yours" in html
+
+
+def test_a_command_stands_in_the_same_table(case) -> None:
+    own = Path(__file__).parents[2] / "examples" / "own_command" / "relax.py"
+    words = f"{shlex.quote(sys.executable)} {shlex.quote(str(own))} --iterations {{iterations}} {{scene}} {{out}}"
+    status, facts, html = page(case, "--solver-command", words)
+    assert status == cli.DONE
+    mine = facts["results"][-1]
+    assert (mine["kind"], mine["name"], mine["solver"]) == ("Yours", "relax", "command")
+    assert mine["seconds_per_frame"] > 0
+    assert "relax" in html
 
 
 def test_a_scene_that_is_not_there_is_left_out_and_reported(case, capsys) -> None:
