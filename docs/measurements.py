@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -236,6 +237,37 @@ def _stress_steps() -> str:
     return table("stress", ("case", "verdict", "to frame", *(f"in {count}" for count in _STEPS)), rows)
 
 
+def _solvers(found: dict[str, Any]) -> Any:
+    kept = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
+    rows = []
+    for one in found["results"]:
+        worst = {name: one["worst"][name]["value"] for name in kept if one["worst"].get(name)}
+        head = {key: one[key] for key in ("kind", "name", "case", "status")}
+        rows.append(head | {"needs": sum(one["needs"].values()), "worst": worst})
+    return rows
+
+
+def _solvers_on_muscles(name: str, head: str) -> str:
+    """A table of one statistic in the worst frame: solvers of each kind, by muscle; of the reference its error bars."""
+    measured = kept("table_5_1")["measured"]
+    cases = list(dict.fromkeys(one["case"] for one in measured))
+    rows = []
+    for kind, solver in dict.fromkeys((one["kind"], one["name"]) for one in measured):
+        found = {one["case"]: one for one in measured if (one["kind"], one["name"]) == (kind, solver)}
+        cells = [_cell(found.get(case), name) for case in cases]
+        rows.append((kind, f"`{solver}`" + (", error bar" if solver == "reference" else ""), *cells))
+    return table("table_5_1", ("", head, *(f"`{case}`" for case in cases)), rows)
+
+
+def _cell(one: dict[str, Any] | None, name: str) -> str:
+    if one is None:
+        return "not measured"
+    if one["status"] != "converged":
+        return one["status"]
+    value = one["worst"].get(name)
+    return "not applicable" if value is None else number(abs(value) if one["kind"] == "FEM" else value, 2)
+
+
 MEASUREMENTS = {
     "verify": Measurement("./fem verify", _verify),
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
@@ -243,6 +275,11 @@ MEASUREMENTS = {
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "stress": Measurement("./fem stress --steps", _stress),
     "credibility": Measurement("./fem page credibility", _credibility),
+    "table_5_1": Measurement(
+        "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
+        "--case adductor_brevis --quick --set frames.last=100 --set frames.every=50 --error-bar",
+        _solvers,
+    ),
 }
 TABLES = {
     "verify_groups": _verify_groups,
@@ -255,4 +292,7 @@ TABLES = {
     "credibility_grades": _credibility_grades,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,
+    "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
+    "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
+    "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
 }
