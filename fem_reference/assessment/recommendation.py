@@ -71,7 +71,7 @@ class Recommendation:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownSettings:
     """All ``settings`` for a case, with ``margins``, from the cases ``of``; ``measured``: True where that is the case itself."""
 
     settings: tuple[Expected, ...]
@@ -101,7 +101,7 @@ def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expe
     return best, None if best else min(known, key=lambda one: one.misses(limits), default=None)
 
 
-def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Known:
+def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> KnownSettings:
     """The settings for a ``case`` with these features; only studies with the ``metric`` count. An error counts as measured plus
     the bar of the truth, as in the tables of a study.
     """
@@ -111,7 +111,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
     margins = Margins() if own else _margins(others, metric)
     known = _measured(own[0], metric) if own else list(_expected(features, others, metric, margins))
     of = (case,) if own else tuple(study.case for study in alike(features, others))
-    return Known(tuple(known), margins, of, bool(own))
+    return KnownSettings(tuple(known), margins, of, bool(own))
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:

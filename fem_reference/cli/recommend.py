@@ -54,8 +54,8 @@ def run(options: argparse.Namespace) -> int:
     own = features(scene, Bench(scene, out(options) / "runs").setup())
     if not limits:
         every = answers(known_settings(own, scene.name, studies, metric).settings)
-        said = answer_texts(every, units[metric])
-        write_output({"metric": metric, "answers": answer_facts(every)}, "\n".join(said), options)
+        lines = answer_texts(every, units[metric])
+        write_output({"metric": metric, "answers": answer_facts(every)}, "\n".join(lines), options)
         return DONE if all(one.best for one in every[:-1]) else VERDICT_FAIL
     found = recommend(own, scene.name, studies, metric, limits)
     said = text(found, scene.name, metric, units[metric], limits.get("error", math.inf))
