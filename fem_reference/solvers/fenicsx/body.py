@@ -62,7 +62,7 @@ class AssembledBody:
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.conditions, self.spent)
-        symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
+        symmetric = all(one.stored for one in body.effects if isinstance(one, Load))  # all others have an energy
         self.linear = _linear_solver(self.system, symmetric, settings)
         self.newton = Newton(self.system, self.linear, self.determinants, settings)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
