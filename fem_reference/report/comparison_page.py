@@ -124,7 +124,7 @@ class VerdictRow(NamedTuple):
 
 
 def first_rows(comparison: Comparison) -> list[VerdictRow]:
-    """The rows of the table at the top, the reference last; its doubts are told beside its verdict."""
+    """The rows of the table at the top, the reference last; its doubts are stated beside its verdict."""
     rows = list[VerdictRow]()
     for run in comparison.candidates:
         found = comparison.deviations.get(run.name, ())
