@@ -228,7 +228,8 @@ def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
         return closed_form(bone, muscle, join(case.place, f"bone[{i}]"))
     surface = files.read_surface(case.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return Bone(bone.name, surface, bone.motion and bone.motion.poses(), bone.distance_error, bone.distance_rounding)
+    motion = bone.motion.poses() if bone.motion else None
+    return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
 def closed_form(bone: CaseBone, muscle: Surface, place: str) -> Bone:
