@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.boxes import around, boxes_of, touching
+from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
@@ -92,7 +92,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
     found, some = np.zeros(len(points)), _in_box(body, points)
     corners = np.unique(body.triangles[known]) if len(known) else np.arange(len(body.points))
     reach = cKDTree(body.points[corners]).query(points[some])[0]
-    near = touching(around(points[some], reach), boxes_of(body))[1]
+    near = reached(around(points[some], reach), boxes_of(body))
     triangles = body.triangles[near][triangle_areas(body.points, body.triangles[near]) > 0]
     if len(triangles):
         vertices, numbers = np.unique(triangles, return_inverse=True)
