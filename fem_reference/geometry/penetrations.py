@@ -90,6 +90,8 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
     The sign is that of the angle-weighted normal at the closest point (Baerentzen and Aanaes 2005, doi 10.1109/TVCG.2005.49).
     """
     found, some = np.zeros(len(points)), _in_box(body, points)
+    if not len(some):
+        return found
     corners = np.unique(body.triangles[known]) if len(known) else np.arange(len(body.points))
     reach = cKDTree(body.points[corners]).query(points[some])[0]
     near = reached(around(points[some], reach), boxes_of(body))
