@@ -186,9 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone. With
-    a ``shift`` the landmarks are elsewhere; the fibres are those of the attachments without it.
-    """
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, no fibres."""
 
     file: str
     unit: LengthUnit
