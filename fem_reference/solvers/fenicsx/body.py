@@ -19,7 +19,7 @@ from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import compiling, contact_points, forms, in_situ, meshes
-from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
+from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion, Tendons
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
@@ -62,7 +62,7 @@ class AssembledBody:
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.conditions, self.spent)
-        symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
+        symmetric = all(one.stored for one in body.effects if isinstance(one, Load))  # all others have an energy
         self.linear = _linear_solver(self.system, symmetric, settings)
         self.newton = Newton(self.system, self.linear, self.determinants, settings)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
@@ -84,7 +84,8 @@ class AssembledBody:
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
-        return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
+        points = contact_points.on_skin(self.displacement, entry.on, self.local)
+        return (PointSprings if entry.anchor is None else Tendons)(self.unknowns, entry, points)
 
     def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
         if isinstance(law.on, str):
