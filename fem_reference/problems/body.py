@@ -19,6 +19,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
+from fem_reference.problems.touching import Touching
 
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, degree of the pressure (None: no such unknown; 0: constant in each cell).
@@ -163,8 +164,9 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
-    ``contact``, if any, acts with every bone. ``interval`` [s]: the time between frame numbers, None where nothing depends on
-    time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, where the body does not start at rest.
+    ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
+    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at
+    ``frames[0]``, where the body does not start at rest.
     """
 
     mesh: Cells
@@ -176,6 +178,7 @@ class Body:
     bones: tuple[ContactBone, ...] = ()
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
+    touching: tuple[Touching, ...] = ()
 
     task: ClassVar[Task] = "solve_body"
     rest: ClassVar[AtRest] = NOTHING

@@ -49,8 +49,9 @@ class ScikitBodySettings(Record):
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element, settings.quadrature_degree)
-    if body.contact is not None:
-        raise InputError("contact", "bones", "a body without, as this solver knows no contact")
+    if body.contact is not None or body.touching:
+        name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
+        raise InputError(name, got, "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
         want = "springs on facets, as this solver knows no others"
         raise InputError("prescribed", "springs at points of a skin", want)
