@@ -102,8 +102,6 @@ class TouchingForces:
         self.look()
         for one, (met, _) in zip(self.passes, self.now, strict=True):
             if len(lost := one.through(before, self.seen, met)):
-                where = place_of(one.places(np.zeros_like(before))[lost[0]])
-                return Trouble(
-                    "diverged", f"contact gives way ({one.names[0]}): through it went the point that rests at {where}"
-                )
+                where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
+                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} went through the other side")
         return None

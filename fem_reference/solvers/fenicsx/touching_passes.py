@@ -105,22 +105,20 @@ class Pass:
         ``b = n y''`` and ``m = a - g b``, ``-d2g = T m^-1 b a^-1 T + 2 T m^-1 D + g D m^-1 D``.
         """
         there, (pressure, change) = met.there, self.law.pressure(met.gap)
-        zero, areas = np.zeros_like(met.here.basis), self.areas[met.points]
         away = np.concatenate([met.here.basis, -there.basis], axis=1)
-        turn = [np.concatenate([zero, slope], axis=1) for slope in np.moveaxis(there.slopes, 1, 0)]
-        products = zip(
-            [away, away, away, *turn],
-            [there.normal, *np.moveaxis(there.tangents, 1, 0), there.normal, there.normal],
-            strict=True,
-        )
-        rows = [(a[:, :, None] * b[:, None]).reshape(len(away), -1) for a, b in products]
+        turn = [np.concatenate([0 * met.here.basis, slope], axis=1) for slope in np.moveaxis(there.slopes, 1, 0)]
+        vectors = [there.normal, *np.moveaxis(there.tangents, 1, 0), there.normal, there.normal]
+        products = zip([away, away, away, *turn], vectors, strict=True)
+        count, width = len(away), 3 * away.shape[1]
+        rows = [(a[:, :, None] * b[:, None]).reshape(count, width) for a, b in products]
         scaled = pressure[:, None, None] * np.linalg.inv(there.metric - met.gap[:, None, None] * there.bend)
-        second = np.zeros((len(away), 5, 5))
+        second = np.zeros((count, 5, 5))
         second[:, 0, 0] = -change
         second[:, 1:3, 1:3] = np.linalg.inv(there.metric) @ there.bend @ scaled
         second[:, 1:3, 3:5] = second[:, 3:5, 1:3] = scaled
         second[:, 3:5, 3:5] = met.gap[:, None, None] * scaled
-        dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(len(away), -1)
+        dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, width)
+        areas = self.areas[met.points]
         return Pressed(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
 
     def through(self, before: Floats, now: Floats, met: Met) -> Ints:
