@@ -16,7 +16,7 @@ _BALL = 1.25  # a facet is within so many times the distance of its farthest nod
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class FacetPlaces:
     """Places on n facets: the reference coordinates ``at`` (n, 2), the values ``basis`` (n, k) of the functions of the nodes and
     their ``slopes`` (n, 2, k), the position ``point`` (n, 3) [mm], the ``tangents`` (n, 2, 3), the outward unit ``normal`` (n, 3),
     and the second derivatives of the position along the normal, ``bend`` (n, 2, 2) [mm].
@@ -35,8 +35,8 @@ class Place:
         """The products (n, 2, 2) [mm2] of the tangents."""
         return self.tangents @ np.swapaxes(self.tangents, 1, 2)
 
-    def __getitem__(self, some: Ints) -> "Place":
-        return Place(*(getattr(self, column.name)[some] for column in fields(self)))
+    def __getitem__(self, some: Ints) -> "FacetPlaces":
+        return FacetPlaces(*(getattr(self, column.name)[some] for column in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Facets:
         points, weights = basix.make_quadrature(self.element.cell_type, degree)
         return np.asarray(points), np.asarray(weights)
 
-    def places(self, nodes: Floats, which: Ints, at: Floats) -> Place:
+    def places(self, nodes: Floats, which: Ints, at: Floats) -> FacetPlaces:
         """The places ``at`` (n, 2) on the facets ``which`` (n,), whose ``nodes`` (m, k, 3) [mm] are given."""
         tables, nodes = self.element.tabulate(2, at)[..., 0], nodes[which]
         point, u, v, uu, uv, vv = np.einsum("dnk,nki->dni", tables, nodes)
@@ -71,9 +71,9 @@ class Facets:
         bends = [np.einsum("ni,ni->n", second, normal) for second in (uu, uv, uv, vv)]
         bend = np.stack(bends, axis=1).reshape(-1, 2, 2)
         slopes = np.swapaxes(tables[1:3], 0, 1)
-        return Place(at, tables[0], slopes, point, np.stack([u, v], axis=1), normal, bend)
+        return FacetPlaces(at, tables[0], slopes, point, np.stack([u, v], axis=1), normal, bend)
 
-    def nearest(self, nodes: Floats, which: Ints, points: Floats) -> Place:
+    def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
         """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
         Newton's method from their middles; only roughly where these are far beyond the edges.
         """

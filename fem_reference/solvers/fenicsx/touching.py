@@ -14,7 +14,7 @@ from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.meshes import Displacement
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, Pressed
+from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
 
 
 class TouchingForces:
@@ -29,7 +29,7 @@ class TouchingForces:
             one, other = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
             names = f"{law.other} on {law.one}", f"{law.one} on {law.other}"
             self.passes += [Pass(law, one, other, names), Pass(law, other, one, names[::-1])]
-        self.now = list[tuple[Met, Pressed]]()
+        self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.look()
         for one, (met, _) in zip(self.passes, self.now, strict=True):

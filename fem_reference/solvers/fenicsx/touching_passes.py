@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay, cKDTree
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.passing import passed
 from fem_reference.problems.touching import Touching
-from fem_reference.solvers.fenicsx.facets import Facets, Place
+from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 
 # Of the quadrature on facets: with 5 instead of 8 the pressure between two blocks with unrelated meshes is off by 5 instead of 2 %.
 _DEGREE = 8
@@ -28,9 +28,9 @@ class Met:
 
     points: Ints
     own: Ints
-    here: Place
+    here: FacetPlaces
     facets: Ints
-    there: Place
+    there: FacetPlaces
     gap: Floats
 
     def some(self, which: Ints) -> "Met":
@@ -40,7 +40,7 @@ class Met:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class PressedPoints:
     """Contact of n points: the unknowns ``dofs`` (n, a) of the nodes that carry them and the places they meet; by these, the first
     derivatives ``rows`` (n, 5, a) of the gap, of the position along two tangents, and of the slopes of the facet along them; the
     ``forces`` (n,) [N], and the second derivatives ``second`` (n, 5, 5) of the energy by the five.
@@ -69,7 +69,7 @@ class Pass:
         corners[turned] = corners[turned][:, ::-1]
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
 
-    def _here(self, nodes: Floats, points: Ints) -> Place:
+    def _here(self, nodes: Floats, points: Ints) -> FacetPlaces:
         """The places of ``points`` (n,) on their own facets."""
         return self.side.places(nodes, points // self.each, self.at[points % self.each])
 
@@ -97,7 +97,7 @@ class Pass:
         order = order[np.unique(some[order], return_index=True)[1]]
         return Met(some, some // self.each, here, facets, there, gap).some(order)
 
-    def pressed(self, met: Met) -> Pressed:
+    def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
 
         With a place y(s, t) on the facet and its unit normal n, the gap of a point x is ``g = n (x - y)`` where x - y is along n.
@@ -119,7 +119,7 @@ class Pass:
         second[:, 3:5, 3:5] = met.gap[:, None, None] * scaled
         dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, width)
         areas = self.areas[met.points]
-        return Pressed(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
+        return PressedPoints(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
 
     def through(self, before: Floats, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
