@@ -1,4 +1,5 @@
 # The public names, for editors and type checkers; ``__init__.py`` finds them here when they are asked for.
+from fem_reference.assessment.calibration import Calibration
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.effects import make as make_effect
@@ -11,6 +12,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.casefile import cases
 from fem_reference.scenes.made import make_case
+from fem_reference.studies.calibration import calibrate_case as calibrate
 from fem_reference.studies.workflow import (
     compare,
     error_bars,
@@ -25,6 +27,7 @@ from fem_reference.studies.workflow import (
 
 __all__ = [
     "Body",
+    "Calibration",
     "Case",
     "Cells",
     "Comparison",
@@ -35,6 +38,7 @@ __all__ = [
     "Run",
     "Touching",
     "box",
+    "calibrate",
     "cases",
     "compare",
     "error_bars",

@@ -14,7 +14,7 @@ import importlib
 import pkgutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -23,33 +23,14 @@ from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit, Range
-from fem_reference.foundations.loads import Shape, Wrench
+from fem_reference.foundations.loads import RampPoint, Shape, Wrench
+from fem_reference.foundations.material_point import REST, fibre_tension
+from fem_reference.foundations.material_point import Moduli as Moduli
 from fem_reference.foundations.material_point import State as State
-from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
 __path__ += outside.folders()
-
-
-class Moduli(NamedTuple):
-    """Stiffness at rest [MPa]: ``shear`` (across the fibres, where there are some), ``bulk``, and the stress that scales the
-    stiffness of ``fibres``; 0 where there is none.
-    """
-
-    shear: float = 0.0
-    bulk: float = 0.0
-    fibres: float = 0.0
-
-
-class RampPoint(Record):
-    """The amount of an effect at a frame number: up to a thousand times its parameters."""
-
-    frame: float
-    amount: float = Field(ge=0, le=1000)
-
-    def __str__(self) -> str:
-        return f"{self.amount:g} at frame {self.frame:g}"
 
 
 class Effect(Record):
@@ -100,7 +81,8 @@ class Effect(Record):
     @property
     def parameters(self) -> list[tuple[str, Any, str]]:
         """Name, value and unit of each parameter."""
-        return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in type(self).model_fields.items()]
+        fields = type(self).model_fields.items()
+        return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in fields if name != "region"]
 
 
 class Ramped(Effect):
@@ -122,13 +104,38 @@ class Ramped(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable."""
+    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable. It acts everywhere, or in a
+    ``region`` of the body (``in``): by the share that a point has in it.
+    """
 
     stored: ClassVar[bool] = True
+    region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
+
+    @field_validator("region")
+    @classmethod
+    def _check_region(cls, region: str) -> str:
+        if "momentum" in cls.needs:
+            raise ValueError("no region: the whole body moves")
+        return region
+
+    @property
+    def title(self) -> str:
+        """Its name among the effects of a scene, which may include others of its kind in other regions."""
+        return type(self).__name__ + (f" in {self.region}" if self.region else "")
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``."""
+        """Energy per rest volume [MPa] at ``state``, of a point that is wholly in its region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
+
+    def local_energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa] at ``state``, by the share of the point in its region."""
+        return state.share(self.region) * self.energy(state) if self.region else self.energy(state)
+
+
+def regions_named(effects: Iterable[Record]) -> list[str]:
+    """The names of the regions in which ``effects`` act, or outside of which, each once."""
+    named = (effect.region for effect in effects if isinstance(effect, Energy) and effect.region)
+    return list(dict.fromkeys(region.removeprefix(REST) for region in named))
 
 
 class VolumeLaw(Energy):
@@ -201,7 +208,9 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
-    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy))
+    return sum(
+        effect.local_energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy)
+    )
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:

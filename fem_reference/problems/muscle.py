@@ -41,7 +41,8 @@ from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
-from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of
+from fem_reference.problems import regions
+from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
@@ -56,6 +57,7 @@ from fem_reference.problems.fibre_ends import attached_ends, completed
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
+from fem_reference.problems.tendons import pulling
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 # Frame numbers before the first over which an overlap at rest is removed.
@@ -112,12 +114,12 @@ class MuscleProblem(Setup):
         taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
         free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
         cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-        prescribed = []
+        prescribed = list(pulling(self, mesh, self.fibres, self.effects))
         for entry in self.attached:
             name, path = entry.attachment, Follows(From(first, entry.bone.pose))
             prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
         acting = tuple(effect for effect in self.effects if not isinstance(effect, Interaction))
-        body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre)
+        body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre, regions=self.regions)
         body = replace(body, interval=self.interval, start=self.start)
         if self.contact is not None:
             assert self.skin is not None  # built with the effect
@@ -149,7 +151,8 @@ def setup(case: MuscleCase) -> Setup:
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
     bones = tuple(_body(case, i, surface) for i in range(len(case.bone)))
     attached, joints = _attached(case, surface, bones), joints_of(case, bones)
-    return Setup(surface, bones, attached, case.frames.numbers, case.frames.interval, joints=joints)
+    rest = Setup(surface, bones, attached, case.frames.numbers, case.frames.interval, joints=joints)
+    return replace(rest, regions=regions.of_case(case, rest, partial(filled, case, rest)))
 
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
@@ -164,11 +167,12 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
-    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    own = rest if (plain := unshifted(case)) is case else setup(plain)
+    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, own))
+    ends = attached_ends(own.attached, own.exempt, fibres)
     if case.fibres.complete and ends is not None:
         fibres = inside(rest.surface, completed(fibres, ends))
-        ends = attached_ends(rest.attached, rest.exempt, fibres)
+        ends = attached_ends(own.attached, own.exempt, fibres)
     asked = (*case.effects, *(one.effect for one in case.decisions))
     needed = fibre if any("fibre" in effect.needs for effect in asked) else None
     problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))

@@ -10,6 +10,7 @@ import numpy as np
 
 from fem_reference.assessment import experiments, second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
+from fem_reference.assessment.credibility import claims
 from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.limits import ENERGY_GAP
@@ -66,7 +67,9 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "bars": known(comparison),
         "spread": spread(comparison),
         "error": error and error.worst,
-        "model_band": experiments.model_band() if comparison.error_bars and comparison.scene.task == "solve" else (),
+        "model_bands": [
+            (one, experiments.model_band(one.band)) for one in claims() if comparison.scene.task == "solve"
+        ],
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,
         "label": partial(label, comparison.scene, comparison.setup),

@@ -46,9 +46,9 @@ def sentences(found: Uncertainty) -> list[str]:
         one.candidate: one.word for one in found.placed if found.bands and one.quantity == found.bands[0].quantity
     }
     for word, text in (
-        ("inside", "Candidates whose surface errs less than what nobody knows: {}."),
+        ("inside", "Candidates whose surface errs less than the unknown parameters move it: {}."),
         ("undecided", "Candidates too near to the edge of the band to say, with the error bar of the reference: {}."),
-        ("outside", "Candidates whose surface errs more than what nobody knows: {}."),
+        ("outside", "Candidates whose surface errs more than the unknown parameters move it: {}."),
     ):
         named = [name for name, one in places.items() if one == word]
         said += [text.format(listed(named))] if named else []

@@ -14,6 +14,7 @@ from fem_reference.foundations.units import Angle, AreaStiffness, Length, Length
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.fibres import Fibres
+from fem_reference.scenes.regions import CaseRegion
 
 # Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
 _FINEST = 1e-3
@@ -178,13 +179,23 @@ class VertexList(Record):
     value: int | None = None
 
 
+class Shift(Record):
+    """A displacement ``by`` a distance ``along`` a direction."""
+
+    along: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))]
+    by: Length
+
+
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone."""
+    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone. With
+    a ``shift`` the landmarks are elsewhere; the fibres are those of the attachments without it.
+    """
 
     file: str
     unit: LengthUnit
     clouds: tuple[str, ...] = Field(min_length=1)
     reach: PositiveLength
+    shift: Shift | None = None
 
 
 class Landmarks(Record):
@@ -198,7 +209,7 @@ class Landmarks(Record):
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
     bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
-    a straight ``tendon`` to a point of the bone: in their lengths only, it does not pull.
+    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` lets it pull.
     """
 
     name: Name
@@ -254,13 +265,14 @@ class MuscleCase(Case):
     bone: tuple[CaseBone, ...] = Field(min_length=1)
     joint: tuple[CaseJoint, ...] = ()
     attachment: tuple[Attachment, ...] = ()
+    region: tuple[CaseRegion, ...] = ()
     fibres: Fibres
     frames: Frames
     uncertain: tuple[Uncertain, ...] = ()
 
     task = "solve"
     carries = frozenset({"surface", "lines"})
-    determined_by = frozenset({"muscle", "bone", "attachment", "fibres", "frames"})
+    determined_by = frozenset({"muscle", "bone", "attachment", "region", "fibres", "frames"})
     naming_files = frozenset({"surface", "file"})
 
     @property

@@ -9,8 +9,9 @@ import pytest
 
 import fem_reference as fr
 from fem_reference import effects
+from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.checks import check
+from fem_reference.problems.checks import check, check_agreement
 from fem_reference.problems.paths import Affine, Along, Rest
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.processes import installed
@@ -75,6 +76,7 @@ def test_components_are_axes(components) -> None:
     ("changes", "message"),
     [
         ({"name": 3}, r"prescribed\.3: name and on: got int 3"),
+        ({"name": np.zeros(0)}, r"prescribed\.\[\]: name and on: got "),
         ({"on": None}, r"prescribed\.top: name and on: got .*NoneType None"),
         ({"on": "lid"}, 'on: got "lid", want a region of the body'),
         ({"path": 3}, r"prescribed\.top\.path: got int 3, want a function of points and a frame number"),
@@ -88,10 +90,20 @@ def test_components_are_axes(components) -> None:
         ({"path": lambda *_: "no"}, '"top": path at frame 0: got ValueError'),
         ({"stiffness": -1.0}, r"prescribed\.top\.stiffness: got -1.0, want more than 0"),
         ({"stiffness": "1 N"}, r"prescribed\.top\.stiffness: got 1 N, want more than 0"),
+        ({"anchor": (0.0, 0.0, 9.0)}, r"prescribed\.top\.anchor: got .*, want None, or springs at points of a skin"),
     ],
 )
 def test_what_is_prescribed_is_a_path_of_a_region(changes, message) -> None:
     refused(replace(BODY, prescribed=(FIXED, replace(TOP, **changes))), message)
+
+
+def test_a_tendon_is_not_beside_tension_at_rest() -> None:
+    skin = Skin(np.zeros(1, int), MESH.points[:1], np.ones(1))
+    tendon = fr.Prescribed("tendon", skin, ALL, Rest(), 1.0, (0.0, 0.0, 9.0))
+    check_agreement(replace(BODY, prescribed=(FIXED, tendon)))
+    tense = (*BODY.effects, effects.make("in_situ", stretch=1.1))
+    with pytest.raises(fr.InputError, match="effects: got a tendon beside in_situ, want one of them"):
+        check_agreement(replace(BODY, effects=tense, prescribed=(FIXED, tendon)))
 
 
 @pytest.mark.parametrize(

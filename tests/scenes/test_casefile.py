@@ -29,7 +29,7 @@ MUSCLE_KEYS = [
     "negative_control",
     "proves",
 ]
-MUSCLE_KEYS += ["quick", "reference", "title", "uncertain", "unsolved"]
+MUSCLE_KEYS += ["quick", "reference", "region", "title", "uncertain", "unsolved"]
 # Solvers check their own settings.
 OPTIONAL = ("interval", "newton_iterations", "stretch", "statistic", 'frame = "any"')
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
@@ -94,6 +94,11 @@ WRONG = [
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
     ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
     (
+        "effect[1]",
+        {"name": "tendon", "on": "top", "stiffness": "1 N/mm", "reach": "1 mm"},
+        'effect[1].on: got "top", want one of start, end, free',
+    ),
+    (
         "effect[0]",
         PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
         "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
@@ -156,7 +161,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "box, capsule, cylinder, distance_error, distance_rounding, half_space, motion, name, sphere, surface, unit",
         ),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, tendon, vertices, within"),
-        ("[[effect]]\n", "effect[0].colour", "mu"),
+        ("[[effect]]\n", "effect[0].colour", "in, mu"),
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, flux, start"),
         ("[frames]\n", "frames.colour", "every, first, interval, last"),
         ("[[expect]]\n", "expect[0].colour", "because, frame, kind, metric, of, statistic, truth, within"),

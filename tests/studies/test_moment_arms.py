@@ -57,15 +57,36 @@ def test_what_has_no_data_is_left_out_with_the_reason(tmp_path: Path, monkeypatc
     monkeypatch.delenv("FEM_REFERENCE_DATA", raising=False)
     found, missing = moment_arms.beside(tmp_path / "runs")
     assert found == ()
-    assert set(missing) == {"gluteus_maximus", "gluteus_maximus_anatomical", "iliacus_anatomical"}
+    assert set(missing) == {one.case for one in moment_arms.STUDIES}
     assert all("FEM_REFERENCE_DATA" in why for why in missing.values())
 
 
 def test_a_coarse_case_has_its_size_and_its_frames_and_nobody_beside() -> None:
-    scene = coarse(casefile.read_muscle("hip_flexion"), 20.0, 50)
+    scene = coarse(casefile.read_muscle("hip_flexion"), 20.0, (0.0, 0.5))
     assert (scene.muscle.tet_size, scene.muscle.refinements) == (20.0, 0)
     assert scene.numbers[-1] == 50
     assert (scene.candidate, scene.expect) == ((), ())
+
+
+@pytest.mark.parametrize(("flexion", "extremes"), [((-0.2, 1.6), (0.2, -1.6)), ((0.0, 1.0), (0.0, -1.0))])
+def test_the_hip_goes_from_rest_back_and_on_by_a_hundredth_of_a_radian_a_frame(flexion, extremes) -> None:
+    """A negative angle about the axis to the left is flexion; every frame is at another angle, but for rest."""
+    scene = coarse(casefile.read_muscle("hip_flexion"), 20.0, flexion)
+    (motion,) = [bone.motion.poses() for bone in scene.bone if bone.motion]
+    angles = np.interp(scene.numbers, motion.frames, motion.amounts)
+    assert angles[0] == 0
+    assert (angles.max(), angles.min()) == pytest.approx(extremes)
+    assert np.abs(np.diff(angles)) == pytest.approx(0.1)
+    assert scene.numbers[1] == 10
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_before_1_rad_is_no_evidence(tmp_path: Path) -> None:
+    short = moment_arms.ArmStudy("hip_flexion", 25.0, (0.0, 0.2), "gluteus_medius", "extension", ())
+    with pytest.raises(
+        InputError, match="hip_flexion: got all 3 frames reached, want a reference that reaches a flexion of 1"
+    ):
+        list(moment_arms.of_case(short, tmp_path / "runs"))
 
 
 @pytest.mark.slow
@@ -76,7 +97,7 @@ def test_arms_of_a_solved_case_are_those_of_the_metric(tmp_path: Path) -> None:
     from fem_reference.metrics.moment_arm import excursion_arms
     from fem_reference.studies.execution import Bench
 
-    bench = Bench(coarse(casefile.read_muscle("hip_flexion"), 25.0, 100), tmp_path / "runs")
+    bench = Bench(coarse(casefile.read_muscle("hip_flexion"), 25.0, (0.0, 1.0)), tmp_path / "runs")
     run = bench.reference()
     assert run.outcome.status == "converged"
     context = context_of(bench.setup(), run)

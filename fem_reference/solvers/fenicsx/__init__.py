@@ -6,6 +6,7 @@ a file, and sinks frames as the worker reports them. A worker that dies is the s
 
 import logging
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from fem_reference.geometry.quadratic import quadratic
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.tendons import force_name
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
@@ -135,7 +137,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
     assert frame.state is not None  # of a muscle
-    results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions)
+    results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions, problem.regions)
     own = pulls | _attachment_errors(problem, frame) | stress_scalars(results, frame.number)
     return replace(frame, note=note, scalars=scalars | own)
 
@@ -146,7 +148,8 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
     """
     found = dict[str, float]()
     for bone in problem.bones:
-        by = [vectors[one.attachment] for one in problem.attached if one.bone.name == bone.name]
+        names = [one.attachment for one in problem.attached if one.bone.name == bone.name]
+        by = [vectors[name] for name in chain(names, map(force_name, names)) if name in vectors]
         by += [vectors[bone.name]] if problem.contact is not None and bone.name in vectors else []
         if by:
             found |= vector_scalars(f"{kind}_on_{bone.name}", -np.sum(by, axis=0))

@@ -19,7 +19,7 @@ from fem_reference.problems.contact import ContactLaw
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import compiling, contact_points, forms, in_situ, meshes
-from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
+from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion, Tendons
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
@@ -34,7 +34,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability
 from fem_reference.solvers.fenicsx.system import System
-from fem_reference.solvers.fenicsx.touching import TouchingForces
+from fem_reference.solvers.fenicsx.touching import touching_of
 from fem_reference.solvers.fenicsx.validity import Validity
 
 
@@ -47,8 +47,8 @@ class AssembledBody:
         self.conserves = not any(changed)  # True where no energy changes without deformation of the body
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        count = self.mesh.topology.index_map(3).size_local
-        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
+        topology = self.mesh.topology
+        self.cells = np.asarray(topology.original_cell_index, np.int64)[: topology.index_map(3).size_local]
         self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
@@ -63,20 +63,18 @@ class AssembledBody:
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.conditions, self.spent)
-        symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
-        self.linear = _linear_solver(self.system, symmetric, settings)
+        self.linear = _linear_solver(self.system, body, settings)
         self.newton = Newton(self.system, self.linear, self.determinants, settings)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
         self.stability = Stability(self.system, cast(Factorised, self.linear)) if counts else None
         self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
-        touching = TouchingForces(body, form, self.displacement, self.spent) if body.touching else None
-        self.touching = self.system.touching = touching
+        self.touching = self.system.touching = touching_of(body, form, self.displacement, self.spent)
         self.system.balance_units()
         in_situ.balance(form, self.system, self.linear, settings.residual)
         self.path = Path(self.system, self.determinants)
         if form.rest is not None:
             self.path.settle(self.energy(), connected=False)
-        contacts = (one for one in (self.contact, touching) if one is not None)
+        contacts = (one for one in (self.contact, self.touching) if one is not None)
         self.checks: tuple[StateCheck, ...] = *contacts, self.determinants, self.validity, self.path, self
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
@@ -87,7 +85,8 @@ class AssembledBody:
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
-        return PointSprings(self.unknowns, entry, contact_points.on_skin(self.displacement, entry.on, self.local))
+        points = contact_points.on_skin(self.displacement, entry.on, self.local)
+        return (PointSprings if entry.anchor is None else Tendons)(self.unknowns, entry, points)
 
     def _contact(self, body: Body, law: ContactLaw, form: forms.Form) -> ContactForces:
         if isinstance(law.on, str):
@@ -289,8 +288,9 @@ class AssembledBody:
         return result
 
 
-def _linear_solver(system: System, symmetric: bool, settings: BodySettings) -> LinearSolver:
+def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
+    symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
         system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it

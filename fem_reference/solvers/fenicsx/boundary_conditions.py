@@ -1,4 +1,4 @@
-"""Boundary conditions on a region, exact or by springs over its facets or at points of a skin, and their reaction forces."""
+"""Boundary conditions on a region, exact or by springs over its facets, at points of a skin or along tendons, and their forces."""
 
 from typing import Any
 
@@ -108,3 +108,35 @@ class PointSprings:
     def _pulls(self, unknowns: Floats) -> Floats:
         """The forces (n, 3) [N] that the points exert on the springs."""
         return self.stiffness * (self.points.positions(unknowns) - self.wanted)
+
+
+class Tendons(PointSprings):
+    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which its path moves: each pulls with
+    its stiffness times its extension ``l - l0``, and slack with nothing.
+    """
+
+    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
+        super().__init__(unknowns, entry, points)
+        self.ends = self.wanted = np.array([entry.anchor])
+        self.lengths = np.linalg.norm(points.rest - self.ends, axis=1)  # at rest
+
+    def extend(self, response: Floats) -> None:
+        """Nothing: no tendon is taut at rest."""
+
+    def tangent(self) -> tuple[Ints, Floats, Floats]:
+        """``k n n^T + k (l - l0) / l (1 - n n^T)`` along the direction n of a taut line, 0 of a slack one."""
+        along, length, tension = self._lines(self.unknowns.x.array)
+        straight = along[:, :, None] * along[:, None, :]
+        taut = np.where(length >= self.lengths, self.stiffness[:, 0], 0.0)[:, None, None]
+        slope = taut * straight + (tension / length)[:, None, None] * (np.eye(3) - straight)
+        return self.points.cells, self.points.basis, slope
+
+    def _pulls(self, unknowns: Floats) -> Floats:
+        along, _, tension = self._lines(unknowns)
+        return tension[:, None] * along
+
+    def _lines(self, unknowns: Floats) -> tuple[Floats, Floats, Floats]:
+        """The directions (n, 3) away from the anchor, lengths (n,) [mm] and tensions (n,) [N] of the lines."""
+        lines = self.points.positions(unknowns) - self.wanted
+        length = np.linalg.norm(lines, axis=1)
+        return lines / length[:, None], length, self.stiffness[:, 0] * np.maximum(length - self.lengths, 0.0)

@@ -17,7 +17,8 @@ from ufl.constantvalue import Zero
 from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
 from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Body
+from fem_reference.geometry.regions import INWARDS
+from fem_reference.problems.body import Body, reference_nodes
 from fem_reference.solvers.fenicsx import compiling, meshes
 from fem_reference.solvers.fenicsx.meshes import DEGREE, geometry, rule
 from fem_reference.solvers.fenicsx.rest_stress import rest_stress
@@ -67,6 +68,7 @@ class Form:
         acting = list(zip(effects, self.amounts, strict=True))
         self.step = _step(effects, unknowns.function_space)
         state, variables = _state(unknowns, self._fibre(body, cells), self.step)
+        state = replace(state, regions=self._regions(body, cells))
         self.determinant = state.J
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         self.rest = rest_stress(unknowns, body.effects)
@@ -130,14 +132,29 @@ class Form:
         """The fibre direction at the quadrature points, where an effect needs it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
-        points, weights = self.rule
-        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), points=points, weights=weights)
-        function = fem.Function(fem.functionspace(self.mesh, element))
-        places = geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
-        directions = body.fibre(np.repeat(cells, len(points)), places)
-        function.x.array[: directions.size] = directions.ravel()
-        function.x.scatter_forward()
+        directions = body.fibre(np.repeat(cells, len(self.rule[0])), self._places(self.rule[0], cells))
+        function = self._known(body, directions)
         return [function[i] for i in range(3)]
+
+    def _regions(self, body: Body, cells: Ints) -> dict[str, Any]:
+        """The shares of the quadrature points in the regions in which effects act."""
+        points, corners = self.rule[0], reference_nodes(body.mesh.kind, 1)
+        within = points + INWARDS * (corners.mean(axis=0) - points)
+        return {name: self._known(body, share) for name, share in body.shares(self._places(within, cells)).items()}
+
+    def _places(self, points: Floats, cells: Ints) -> Floats:
+        """The places (n, 3) [mm] at rest of reference ``points`` (q, 3) in all cells."""
+        return geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
+
+    def _known(self, body: Body, values: Floats) -> fem.Function:
+        """A function with ``values`` (n, ...) at the quadrature points."""
+        points, weights = self.rule
+        shape = values.shape[1:]
+        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=shape, points=points, weights=weights)
+        function = fem.Function(fem.functionspace(self.mesh, element))
+        function.x.array[: values.size] = values.ravel()
+        function.x.scatter_forward()
+        return function
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,8 +66,6 @@ class Factorised:
         self.preconditioner = self.krylov.getPC()
         self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
         self.preconditioner.setFactorSolverType("mumps")
-        # Read at its first factorisation.
-        PETSc.Options().setValue(f"{self.krylov.getOptionsPrefix()}pc_precision", precision)
         self.krylov.setFromOptions()
         self.preconditioner.setFactorSetUpSolverType()
         self.factors = self.preconditioner.getFactorMatrix()
@@ -95,10 +93,14 @@ class Factorised:
         """Factorise the present matrix; ``LinearSolveError`` where this fails."""
         if self.entries != self.matrix.getInfo()["nz_used"]:  # of a matrix that has grown the factors are others
             self._choose(self.precision)
+        options = PETSc.Options(self.krylov.getOptionsPrefix())
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
+            # Read here alone; PETSc warns at its end of an option that nothing has read.
+            options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
+            options.delValue("pc_precision")
             self.preconditioner.setReusePreconditioner(True)
         self.spent.counts["factorisations"] += 1
         if self.factors.getMumpsInfog(_ERROR) < 0:

@@ -105,3 +105,8 @@ class TouchingForces:
                 where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
                 return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} went through the other side")
         return None
+
+
+def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:
+    """The contact between parts of the surface of a ``body``, None where it names none."""
+    return TouchingForces(body, form, displacement, spent) if body.touching else None

@@ -22,7 +22,7 @@ from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
-from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.case import Candidate, SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, following
@@ -64,15 +64,26 @@ class Posed:
         return of_case.problem(case, of_case.setup(case))
 
 
-def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
-    """Every solver, or ``only`` these, on each case, the reference first; it also ``in_steps`` and on so many ``jitters``."""
+def run(
+    hard: Sequence[Hard],
+    only: Sequence[str] = (),
+    own: Sequence[Candidate] = (),
+    *,
+    in_steps: bool = False,
+    jitters: int = 0,
+) -> Stress:
+    """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
+    so many ``jitters``.
+    """
     begin, cells = time.perf_counter(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
+    limit = {"time_limit": f"{LIMIT:g} s"}
+    chosen |= {one.name: SolverChoice(**{"solver": one.solver, **limit, **one.settings}) for one in own}
     with fenicsx.shared():
         for i, one in enumerate(hard):
             posed, place = Posed(one, in_steps=in_steps, jitters=jitters), f"case {i + 1} of {len(hard)}: {one.name}"
             for name, choice in chosen.items():
-                found = cell(posed, one.choice(choice))
+                found = replace(cell(posed, one.choice(choice)), solver=name)
                 log.info("%s, %s: %s: %s", place, name, found.verdict, found.sentence)
                 cells.append(found)
     rows = tuple(HardCase(one.name, one.title, one.healthy, one.bound) for one in hard)

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from fem_reference.geometry import skins
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.paths import Affine, Rest
+from fem_reference.problems.paths import Affine, Rest, Turn
 from tests.solvers.fenicsx.test_body import BOTH, FLESH, ONCE, box, effect, settings
 
 pytestmark = pytest.mark.slow
@@ -56,3 +58,49 @@ def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> Non
         forces.append(state.forces["top"][2])
     # Ten times stiffer, ten times nearer, up to what the body's 0.03 N/mm are of the springs' 100 N/mm.
     assert (forces[1] - forces[0]) / (forces[2] - forces[0]) == pytest.approx(10, rel=1e-3)
+
+
+def tied(anchor: tuple[float, float, float], path, stiffness: float) -> Body:
+    """A block of 1 mm on smooth planes whose top is tied to an ``anchor`` by tendons of a ``stiffness`` [MPa/mm]. Their points make
+    up a rule on the facets that is exact for squares, so that equal tensions are a uniform traction.
+    """
+    mesh = box("P2/P1")
+    facets = mesh.facets["z1"]
+    places, areas = skins.points(mesh.points[facets], np.ones((len(facets), 3)))
+    cells = [np.isin(mesh.cells, facet).sum(axis=1).argmax() for facet in facets]
+    fixed = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
+    tendons = Prescribed("tendon", Skin(np.repeat(cells, 3), places, areas), (0, 1, 2), path, stiffness, anchor)
+    return Body(mesh, FLESH, (*fixed, tendons), (0.0, 1.0))
+
+
+def test_a_block_and_a_tendon_in_series_share_the_extension(session) -> None:
+    """The anchor is 1e4 mm away, so that lines are parallel to 1e-4, and is pulled by 1 mm: ``mu (l - l^-2) = k (1 - (l - 1))``
+    per area. The bulk modulus is a hundred times the shear modulus: the volume grows by 3e-3, the length by a third of that.
+    """
+    stiffness, mu = 0.02, 0.01
+    body = tied((0.5, 0.5, 1e4), Affine(((0.0,) * 3,) * 3, (0.0, 0.0, 1.0)), stiffness)
+    state = session.solve(body, settings("P2/P1")).last
+    stretch = brentq(lambda one: mu * (one - one**-2) - stiffness * (2 - one), 1.0, 2.0)
+    top = state.points[body.mesh.points[:, 2] == 1, 2]
+    assert top == pytest.approx(stretch, abs=2e-3)
+    assert state.forces["tendon"][2] == pytest.approx(stiffness * (2 - top.mean()), rel=1e-4)
+    assert np.ptp(top) < 1e-4
+
+
+def test_a_slack_tendon_does_not_push(session) -> None:
+    body = tied((0.5, 0.5, 3.0), Affine(((0.0,) * 3,) * 3, (0.0, 0.0, -1.0)), 0.02)
+    state = session.solve(body, settings("P2/P1")).last
+    assert state.points == pytest.approx(body.mesh.points, abs=1e-9)
+    assert np.abs(state.forces["tendon"]).max() == 0
+
+
+def test_tendons_pull_along_their_lines_however_far_the_bone_turns(session) -> None:
+    """All lines pass through the anchor: its place, by a turn of 1.2 rad, times the force is their moment, to the residual."""
+    anchor, turn = np.array([0.5, 3.0, 1.5]), Turn((1.0, 0.0, 0.0), 1.2)
+    body = tied(tuple(anchor), turn, 0.02)
+    state = session.solve(body, settings("P2/P1", first_step=0.2)).last
+    (there,) = anchor + turn(anchor[None], 1.0)
+    assert np.linalg.norm(state.forces["tendon"]) > 1e-3
+    assert state.moments["tendon"] == pytest.approx(np.cross(there, state.forces["tendon"]), abs=1e-9)
+    off = sum(state.forces.values())
+    assert off == pytest.approx(np.zeros(3), abs=1e-9)

@@ -1,0 +1,26 @@
+"""Straight tendons that pull the muscle to bone beyond it, as the iliotibial tract does."""
+
+from typing import Any, ClassVar
+
+from fem_reference.effects import Interaction
+from fem_reference.foundations.units import PositiveLength, Stiffness
+
+
+class Tendon(Interaction):
+    """Tension ``k (l - l0)`` along straight lines that are longer than at rest, from the surface within ``reach`` of the ends of
+    those fibres that go on by the ``tendon`` of an attachment, to that point of its bone; slack lines do not push.
+
+    ``on``: that attachment; ``stiffness`` [N/mm]: of all lines together, k by share of the area, ``E A / l0`` of a tendon of the
+    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and is not beside ``in_situ``.
+    Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
+    """
+
+    example: ClassVar[dict[str, Any]] = {"on": "insertion", "stiffness": "20 N/mm", "reach": "15 mm"}
+    on: str
+    stiffness: Stiffness
+    reach: PositiveLength
+
+    @property
+    def title(self) -> str:
+        """Its name among the effects of a scene, which may include tendons of other attachments."""
+        return f"{type(self).__name__} on {self.on}"

@@ -1,0 +1,57 @@
+"""Tendons that pull: springs from the surface of a muscle, about the ends of its fibres, to points of bones beyond it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fem_reference.effects import Effect, in_situ
+from fem_reference.effects.tendon import Tendon
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, TetMesh
+from fem_reference.geometry.sectors import attached_shares
+from fem_reference.geometry.skins import attached_skin, spacing
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.fibre_ends import attached_ends, ends_of
+from fem_reference.problems.paths import Follows, From
+from fem_reference.problems.setup import Setup
+
+
+def force_name(attachment: str) -> str:
+    """The name under which the force of the tendons of an ``attachment`` is reported."""
+    return f"{attachment}_tendon"
+
+
+def check(body: Body) -> None:
+    """Raise InputError where a tendon is beside tension at rest."""
+    if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
+        raise InputError(
+            "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
+        )
+
+
+def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect, ...]) -> Iterator[Prescribed]:
+    """The springs of each effect ``tendon`` among ``effects``, of a set-up ``rest`` filled with a ``mesh`` and ``fibres``."""
+    for effect in effects:
+        if isinstance(effect, Tendon):
+            yield _springs(effect, rest, mesh, fibres)
+
+
+def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> Prescribed:
+    """The springs of an ``effect``; InputError where no fibre goes on by its tendon."""
+    number = [one.attachment for one in rest.attached].index(effect.on)
+    entry, place = rest.attached[number], f"effect {effect.title}"
+    if entry.tendon is None:
+        raise InputError(place, f'the attachment "{effect.on}" without a tendon', "landmarks that it goes to")
+    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    assert ends is not None  # of an attachment
+    beyond = (ends.by == number) & np.isfinite(ends.tendons[:, :, 0])
+    if not beyond.any():
+        raise InputError(place, "no fibre that goes on by it", "fibres that end beside the attachment")
+    away, _ = cKDTree(ends_of(fibres)[beyond]).query(rest.surface.points)
+    shares = attached_shares(rest.surface, np.setdiff1d(np.flatnonzero(away <= effect.reach), rest.attached_vertices))
+    skin = attached_skin(rest.surface, shares, mesh, spacing(rest.surface))
+    if not skin.areas.sum() > 0:
+        raise InputError(f"{place}.reach", f"{effect.reach:g} mm, within which no triangle is free", "a greater one")
+    path, (x, y, z) = Follows(From(rest.frames[0], entry.bone.pose)), map(float, entry.tendon)
+    return Prescribed(force_name(effect.on), skin, (0, 1, 2), path, effect.stiffness / skin.areas.sum(), (x, y, z))
