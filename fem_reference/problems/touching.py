@@ -23,6 +23,11 @@ class Touching:
     stiffness: float
     smoothing: float
 
+    @property
+    def forces(self) -> tuple[str, str]:
+        """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
+        return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
+
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
         return penalty(gap, self.stiffness, self.smoothing)

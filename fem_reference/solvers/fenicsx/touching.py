@@ -26,9 +26,8 @@ class TouchingForces:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
         self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
         for law in body.touching:
-            one, other = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
-            names = f"{law.other} on {law.one}", f"{law.one} on {law.other}"
-            self.passes += [Pass(law, one, other, names), Pass(law, other, one, names[::-1])]
+            low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
+            self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.look()
@@ -41,7 +40,7 @@ class TouchingForces:
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
-                lasts = [met for met, _ in self.now] or [None] * len(self.passes)
+                lasts = [*(met for met, _ in self.now), *(None for _ in self.passes if not self.now)]
                 mets = [
                     one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
                 ]

@@ -18,6 +18,7 @@ _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges: where two facets meet at an angle, Newton's method would go
 # back and forth between them.
 _STAYS = 0.05
+_BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,21 +82,35 @@ class Pass:
         """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
         reaches as deep as its radius, less than the thickness of two parts.
         """
-        nodes, own, points = self.other.nodes(unknowns), self.side.nodes(unknowns), self.places(unknowns)
+        nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
         some, facets = pairs(points, middles, radii + np.maximum(radii, most))
-        there, here = self.other.nearest(nodes, facets, points[some]), self._here(own, some)
+        some, facets = self._beside(nodes, points, some, facets, most)
+        there = self.other.nearest(nodes, facets, points[some])
         gap = np.einsum("ni,ni->n", points[some] - there.point, there.normal)
         beyond, before = self.other.beyond(there.at), np.full(len(points), -1)
         if last is not None:
             before[last.points] = last.facets
-        stays = (before[some] == facets) & (beyond <= _STAYS)
-        beyond[stays] = -1.0
-        felt = (gap < most) & (gap > -radii[facets]) & (beyond <= _BEYOND)
-        felt &= np.einsum("ni,ni->n", here.normal, there.normal) < 0
-        order = np.flatnonzero(felt)[np.lexsort((np.abs(gap[felt]), beyond[felt], some[felt]))]
-        order = order[np.unique(some[order], return_index=True)[1]]
-        return Met(some, some // self.each, here, facets, there, gap).some(order)
+        beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
+        felt = np.flatnonzero((gap < most) & (gap > -radii[facets]) & (beyond <= _BEYOND))
+        here = self._here(self.side.nodes(unknowns), some[felt])
+        faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
+        found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
+        order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
+        order = order[faces[order]]
+        return found.some(order[np.unique(found.points[order], return_index=True)[1]])
+
+    def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
+        """Of pairs of points and facets those that may be at gaps up to ``most`` [mm], and less deep than the radius, by the
+        plane through the middle of the facet and the heights of its nodes above that.
+        """
+        middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
+        _, radii = self.other.balls(nodes)
+        heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
+        bulge = np.abs(heights).max(axis=1) * _BULGE
+        height = np.einsum("ni,ni->n", points[some] - middle.point[facets], middle.normal[facets])
+        kept = (height < most + bulge[facets]) & (height > -(radii + bulge)[facets])
+        return some[kept], facets[kept]
 
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
