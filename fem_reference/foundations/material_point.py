@@ -129,6 +129,26 @@ class State:
         return above(x, high, high, above(x, low, x, low))
 
 
+@dataclass(frozen=True)
+class FieldState:
+    """A scalar function at a point: its ``value``, ``gradient`` (one entry per coordinate) and, for an unknown, ``laplacian``."""
+
+    value: Any
+    gradient: Sequence[Any]
+    laplacian: Any = 0.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point at which a field effect acts: the ``position`` (x, y, z as far as they exist), the ``functions`` of formulas, and
+    ``upper``, the share of the element above the mean y of the vertices.
+    """
+
+    position: Sequence[Any]
+    functions: Mapping[str, Any]
+    upper: Any
+
+
 def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:
     """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of an ``energy``."""
 

@@ -66,7 +66,7 @@ class Inside:
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
+class Around:
     """The part of a body within a ``reach`` [mm] of a ``surface``, closed or not."""
 
     surface: Surface
@@ -78,7 +78,7 @@ class Near:
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class Between:
     """The part of a body where a Laplace ``field`` between two attachments is from ``first`` to ``last``; 0 and 1 mean up
     to an attachment. A difference of the field over its mean slope is a depth.
     """

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from fem_reference.effects import Effect, Energy
+from fem_reference.effects import Effect, region_of
 from fem_reference.foundations.loads import Shape, Wrench, total
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.quadratic import Displaced
@@ -23,4 +23,4 @@ def external_load(
 
 def _resultant(effect: Effect, shape: Shape) -> Wrench | None:
     """The force and moment of an effect on the whole body; None where it acts from outside on a region of it."""
-    return None if effect.outer and isinstance(effect, Energy) and effect.region else effect.resultant(shape)
+    return None if effect.outer and region_of(effect) else effect.resultant(shape)

@@ -60,8 +60,7 @@ from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_o
 from fem_reference.problems.tendons import pulling
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
-# Frame numbers before the first over which an overlap at rest is removed.
-RELAXING = 10
+RELAXING = 10  # frame numbers before the first over which an overlap at rest is removed
 
 
 def kept_meshes() -> Path | None:
@@ -173,9 +172,8 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
     if case.fibres.complete and ends is not None:
         fibres = inside(rest.surface, completed(fibres, ends))
         ends = attached_ends(own.attached, own.exempt, fibres)
-    asked = (*case.effects, *(one.effect for one in case.decisions))
-    needed = fibre if any("fibre" in effect.needs for effect in asked) else None
-    problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
+    asked = any("fibre" in effect.needs for effect in (*case.effects, *(one.effect for one in case.decisions)))
+    problem = assembled(rest, mesh, case.effects, (fibres, fibre if asked else None), spacing(rest.surface))
     facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known | ({} if ends is None else ends.facts)
     return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
@@ -215,9 +213,8 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
-    blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
-    mesh = block.fill(rest.surface, size) if blocks else filled(rest.surface, size)
+    mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
     if set(mesh.facets) == set(shares):
         return mesh
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
@@ -225,11 +222,11 @@ def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
 
 def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
     bone = case.bone[i]
-    motion = bone.motion.poses() if bone.motion else None
     if bone.surface is None or bone.unit is None:
         return closed_form(bone, muscle, join(case.place, f"bone[{i}]"))
     surface = files.read_surface(case.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
+    motion = bone.motion.poses() if bone.motion else None
     return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
@@ -297,6 +294,5 @@ def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: Contac
     before = first - RELAXING if nearest < effect.smoothing and not tense else None
     relaxed, support = None if before is None else (before, first), effect.support or 0.0 if tense else None
     law = ContactLaw(skin, effect.stiffness, effect.smoothing, relaxed, support)
-    frames = body.frames if before is None else (before, *body.frames)
     posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
-    return replace(body, frames=frames, contact=law, bones=posed)
+    return replace(body, frames=(*(relaxed or (first,)), *body.frames[1:]), contact=law, bones=posed)

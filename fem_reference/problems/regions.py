@@ -5,13 +5,13 @@ from itertools import combinations
 
 import numpy as np
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, State, region_of
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, check_closed, enclosed_volume, place_of
 from fem_reference.foundations.records import join
 from fem_reference.geometry.fibres import fibre_field
-from fem_reference.geometry.regions import Along, Blended, Depth, Inside, Near, Region, Union, samples
+from fem_reference.geometry.regions import Around, Between, Blended, Depth, Inside, Region, Union, samples
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.io import files
 from fem_reference.problems.anatomy import field_mesh
@@ -40,16 +40,16 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
             attached_shares(rest.surface, one.vertices) for one in rest.attached if one.attachment == near.name
         )
         whole = shares.all(axis=1) if shares.all(axis=1).any() else shares.any(axis=1)
-        return Near(Surface(rest.surface.points, rest.surface.triangles[whole]), near.length)
+        return Around(Surface(rest.surface.points, rest.surface.triangles[whole]), near.length)
     if (patch := region.patch) is not None:
-        return Near(files.read_surface(case.file(patch.file, f"{key}.patch.file"), patch.unit), patch.depth)
+        return Around(files.read_surface(case.file(patch.file, f"{key}.patch.file"), patch.unit), patch.depth)
     if (closed := region.surface) is not None:
         place = join(case.place, f"{key}.surface.file")
         given = files.read_surface(case.file(closed.file, f"{key}.surface.file"), closed.unit)
         return Inside(check_closed(Surface(given.points, given.triangles, f"{place}: {given.place}")))
     share = region.field
     assert share is not None  # a CaseRegion record has one of the four
-    return Along(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
+    return Between(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
 
 
 def facts(rest: Setup) -> dict[str, str]:
@@ -71,24 +71,25 @@ def check(body: Body) -> None:
     """Raise InputError where an effect acts in a region that there is not, or nowhere, or shares are not from 0 to 1; or where laws
     of shape, of volume, or of the pressure unknown leave a part of the body without.
     """
-    laws = {i: effect for i, effect in enumerate(body.effects) if isinstance(effect, Energy)}
-    for i, law in laws.items():
-        if (name := law.region.removeprefix(REST)) and name not in body.regions:
+    named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
+    for i, region in named.items():
+        if region.removeprefix(REST) not in body.regions:
             want = f"a region of the body: {', '.join(body.regions) or 'it has none'}"
-            raise InputError(f"effects[{i}].in", f'"{law.region}"', want)
-    points = np.concatenate(list(body.mesh.places())) if any(law.region for law in laws.values()) else np.zeros((0, 3))
-    if not len(points):
+            raise InputError(f"effects[{i}].in", f'"{region}"', want)
+    if not named:
         return
+    points = np.concatenate(list(body.mesh.places()))
     at = State(F=(), regions=body.shares(points))
-    for i, law in laws.items():
-        share = np.asarray(at.share(law.region))
+    for i, region in named.items():
+        share = at.share(region)
         if not (share.min() >= 0 and share.max() <= 1):
-            raise InputError(f"regions: {law.region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
+            raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
         if share.max() == 0:
-            raise InputError(f"effects[{i}].in", f'"{law.region}", which is nowhere in the body', "a part of the body")
-    _check_whole("shape", [law for law in laws.values() if law.moduli().shear], at, points)
-    _check_whole("volume", [law for law in laws.values() if law.moduli().bulk and not law.unknowns], at, points)
-    _check_whole("pressure", [law for law in laws.values() if law.unknowns], at, points)
+            raise InputError(f"effects[{i}].in", f'"{region}", which is nowhere in the body', "a part of the body")
+    laws = [effect for effect in body.effects if isinstance(effect, Energy)]
+    _check_whole("shape", [law for law in laws if law.moduli().shear], at, points)
+    _check_whole("volume", [law for law in laws if law.moduli().bulk and not law.unknowns], at, points)
+    _check_whole("pressure", [law for law in laws if law.unknowns], at, points)
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:

@@ -226,7 +226,7 @@ class _Places:
             now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
             for effect, amount in acting:
                 if isinstance(effect, Energy):
-                    yield type(effect).__module__.rpartition(".")[2], effect.local_energy(replace(now, amount=amount))
+                    yield type(effect).__module__.rpartition(".")[2], effect.weighted(replace(now, amount=amount))
             if len(self.state.response):
                 whole = self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY)
                 yield "in_situ", self._at_rest(whole)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, FieldEffect, Ramped, in_situ, moduli, name_of
+from fem_reference.effects import Effect, FieldEffect, Ramped, in_situ, moduli, name_of, region_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -206,7 +206,7 @@ def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) ->
     """An effect acts once in each region (two of a name would share the unknowns that it brings), a load once on each part of the
     surface. A bulk modulus below the shear modulus there is of no tissue, and usually a slip of units.
     """
-    places = [effect.region if isinstance(effect, Energy) else "" for effect in effects]
+    places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
     known = [moduli([effect]) for effect in effects]
     for i, (name, on, region) in enumerate(acting):

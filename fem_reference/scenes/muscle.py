@@ -160,9 +160,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into
-    eight (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of
-    boxes, each cut into six (``"block"``).
+    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each is then cut into eight (``refinements``),
+    and the ``mesher``: good tetrahedra (``"quality"``), or of a box along the axes a grid, each box cut into six (``"block"``).
     """
 
     surface: str
@@ -187,9 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone. With
-    a ``shift`` the landmarks are elsewhere; the fibres are those of the attachments without it.
-    """
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, no fibres."""
 
     file: str
     unit: LengthUnit

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from fem_reference.effects import Effect, Energy
+from fem_reference.effects import Effect, region_of
 from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.records import Name, Record, check_used, one_of
 from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
@@ -81,8 +81,10 @@ def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments:
     """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that is not there, or one of
     the ``regions`` is at another attachment than one of ``attachments``.
     """
-    laws = [(f"effect[{i}].in", law.region) for i, law in enumerate(effects) if isinstance(law, Energy) and law.region]
-    check_used([one.name for one in regions], [(key, region.removeprefix(REST)) for key, region in laws], place)
+    laws = [
+        (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))
+    ]
+    check_used([one.name for one in regions], laws, place)
     for i, one in enumerate(regions):
         near = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
         ends = (

@@ -12,7 +12,7 @@ from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.cost_study import CaseStudy, Study, load
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.assessment.fronts import COSTS, Point
+from fem_reference.assessment.fronts import COSTS, LOAD, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import made_with
@@ -152,7 +152,9 @@ def costs(run: Run) -> dict[str, float]:
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
     found = {} if seconds is None else {"seconds_per_frame": seconds}
-    return found | {name: value for name, value in cost.items() if name in COSTS or name.startswith("seconds_")}
+    return found | {
+        name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")
+    }
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:

@@ -91,7 +91,7 @@ def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> 
     """
     back, on = (round(_RAD * angle) for angle in flexion)
     turned = {0: 0.0, -back: back / _RAD, on - 2 * back: on / _RAD}  # frame numbers and flexion
-    keys = tuple(Keyframe(frame=frame, angle=f"{-angle} rad") for frame, angle in turned.items())
+    keys = tuple(Keyframe.model_validate({"frame": at, "angle": f"{-angle} rad"}) for at, angle in turned.items())
     bones = tuple(
         bone.model_copy(update={"motion": bone.motion.model_copy(update={"keyframes": keys})}) if bone.motion else bone
         for bone in scene.bone

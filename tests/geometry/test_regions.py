@@ -8,7 +8,7 @@ import shapes
 
 from fem_reference.foundations.mesh import Surface, TetMesh, boundary, tet_volumes
 from fem_reference.geometry.fibres import fibre_field
-from fem_reference.geometry.regions import Along, Blended, Inside, Near, Union, samples
+from fem_reference.geometry.regions import Around, Between, Blended, Inside, Union, samples
 
 SIZE = (10.0, 10.0, 40.0)
 
@@ -27,7 +27,7 @@ FIELD = fibre_field(_bar(4), "bottom", "top")  # z / 40 exactly, as linear eleme
 
 
 @pytest.mark.parametrize(
-    "depth", [Near(END, 12.0), Inside(_skin(shapes.box((1, 1, 1), (10, 10, 12.0)))), Along(FIELD, 0.0, 0.3)]
+    "depth", [Around(END, 12.0), Inside(_skin(shapes.box((1, 1, 1), (10, 10, 12.0)))), Between(FIELD, 0.0, 0.3)]
 )
 def test_the_three_kinds_of_borders_of_a_plane_end_agree(depth):
     """The last 12 mm of a bar, to whose sides the box is not near."""
@@ -38,19 +38,19 @@ def test_the_three_kinds_of_borders_of_a_plane_end_agree(depth):
 
 
 def test_a_border_without_width_is_a_jump_and_belongs_to_its_region():
-    found = Blended(Near(END, 12.0), 0.0)(np.array([[4.0, 4, 11.9], [4, 4, 12.0], [4, 4, 12.1]]))
+    found = Blended(Around(END, 12.0), 0.0)(np.array([[4.0, 4, 11.9], [4, 4, 12.0], [4, 4, 12.1]]))
     assert found.tolist() == [1, 1, 0]
 
 
 def test_a_share_of_the_field_reaches_to_the_attachments():
     at_ends = np.array([[5.0, 5, 0], [5, 5, 40], [5, 5, 20]])
-    assert Blended(Along(FIELD, 0.0, 0.2), 5.0)(at_ends) == pytest.approx([1, 0, 0])
-    assert Blended(Along(FIELD, 0.8, 1.0), 5.0)(at_ends) == pytest.approx([0, 1, 0])
-    assert Blended(Along(FIELD, 0.4, 0.6), 2.0)(at_ends) == pytest.approx([0, 0, 1])
+    assert Blended(Between(FIELD, 0.0, 0.2), 5.0)(at_ends) == pytest.approx([1, 0, 0])
+    assert Blended(Between(FIELD, 0.8, 1.0), 5.0)(at_ends) == pytest.approx([0, 1, 0])
+    assert Blended(Between(FIELD, 0.4, 0.6), 2.0)(at_ends) == pytest.approx([0, 0, 1])
 
 
 def test_a_union_is_all_of_its_regions_and_stays_below_one():
-    near, far = Blended(Along(FIELD, 0.0, 0.4), 8.0), Blended(Along(FIELD, 0.6, 1.0), 8.0)
+    near, far = Blended(Between(FIELD, 0.0, 0.4), 8.0), Blended(Between(FIELD, 0.6, 1.0), 8.0)
     inside = samples(_skin(_bar()))
     assert Union((near, far))(inside) == pytest.approx(near(inside) + far(inside), abs=1e-12)
     both = Union((near, near))(inside)
@@ -62,7 +62,7 @@ def test_samples_fill_a_body_evenly():
     found = samples(_skin(_bar()))
     assert 15_000 < len(found) < 25_000
     assert found.mean(axis=0) == pytest.approx([5, 5, 20], abs=1e-9)  # of a box, by symmetry
-    share = Blended(Near(END, 12.0), 2.0)(found).mean()
+    share = Blended(Around(END, 12.0), 2.0)(found).mean()
     assert share == pytest.approx(
         (10 + 2 * (1 / np.log(1000) - 1 / 999)) / 40, abs=3e-3
     )  # planes of the grid are 0.6 mm apart

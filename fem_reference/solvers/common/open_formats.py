@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fem_reference.effects import Effect, Energy, name_of
+from fem_reference.effects import Effect, name_of, region_of
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
@@ -114,7 +114,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
     """The name of an effect, its law in words, and its parameters, each with its value and unit."""
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
-    there = {"in": effect.region} if isinstance(effect, Energy) and effect.region else {}
+    there = {"in": region} if (region := region_of(effect)) else {}
     return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters} | there
 
 

@@ -47,8 +47,8 @@ class AssembledBody:
         self.conserves = not any(changed)  # True where no energy changes without deformation of the body
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        topology = self.mesh.topology
-        self.cells = np.asarray(topology.original_cell_index, np.int64)[: topology.index_map(3).size_local]
+        count = self.mesh.topology.index_map(3).size_local
+        self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
         self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
@@ -290,7 +290,7 @@ class AssembledBody:
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
+    symmetric = all(one.stored for one in body.effects if isinstance(one, Load))  # all others have an energy
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
         system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it

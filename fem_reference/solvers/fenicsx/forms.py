@@ -14,7 +14,7 @@ from dolfinx import fem, mesh
 from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
-from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, regions_named, total_energy
 from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.regions import INWARDS
@@ -74,7 +74,8 @@ class Form:
         self.rest = rest_stress(unknowns, body.effects)
         at_rest = 0 if self.rest is None else self.rest.energy(state)
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
-        self.energy = (total_energy(stored, state) + at_rest) * self.dx
+        stretched = self._stretched(acting, body, state)
+        self.energy = (total_energy(stored, state) + at_rest) * self.dx + stretched
         self.kinetic: Any = 0
         if self.step is not None and (velocity := self.step.velocity) is not None:
             moving: list[Any] = [effect for effect in effects if "momentum" in effect.needs]
@@ -89,7 +90,7 @@ class Form:
         }
         self._isotropic = None if self.rest is None else self._derivatives(self.rest.isotropic(state), variables)
         self.set_amounts(body.frames[0])
-        self.loads = self._loads(acting, state, unknowns)
+        self.loads = self._loads(acting, state, unknowns) + (ufl.derivative(stretched, unknowns) if stretched else 0)
 
     def set_amounts(self, frame: float) -> None:
         """Set the amounts of effects at a frame, and the derivatives of effects that are not zero over whole frames there."""
@@ -115,10 +116,20 @@ class Form:
         first, second = _differentiated(energy, by, self.kinds)
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
+    def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
+        """The energy of what is stretched on the surface, 0 without; shares in regions are linear between the vertices."""
+        stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
+        shares: dict[str, Any] = {}
+        for name in regions_named(stored):
+            share = shares[name] = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)))
+            share.x.array[:] = body.regions[name](share.function_space.tabulate_dof_coordinates())
+        at, normal = replace(state, regions=shares), list(ufl.FacetNormal(self.mesh))
+        return sum(effect.potential(at, normal) * self.measure(effect.on) for effect in stored)
+
     def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
         test, loads = ufl.TestFunction(unknowns.function_space), 0
         for effect, amount in acting:
-            if isinstance(effect, Load):
+            if isinstance(effect, Load) and not effect.stored:
                 traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(self.mesh)))
                 work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
                 loads -= work * self.measure(effect.on)

@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
-from fem_reference.effects import Effect, Energy, State, name_of
+from fem_reference.effects import Effect, State, name_of, region_of
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
@@ -125,7 +125,7 @@ class Validity:
 
     def _acts(self, effect: Effect) -> Any:
         """True in cells whose middle an ``effect`` has most of: (n,), or one for all."""
-        return not isinstance(effect, Energy) or self.here.share(effect.region) > 1 / 2
+        return self.here.share(region_of(effect)) > 1 / 2
 
     def _means(self, measure: str) -> Floats:
         """The means over the cells of this rank (n,)."""

@@ -18,6 +18,7 @@ from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress, Verdict
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.runs.key import made_with
@@ -75,7 +76,7 @@ def run(
     """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
     so many ``jitters``.
     """
-    begin, cells = time.perf_counter(), list[Cell]()
+    begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     limit = {"time_limit": f"{LIMIT:g} s"}
     chosen |= {one.name: SolverChoice(**{"solver": one.solver, **limit, **one.settings}) for one in own}
@@ -87,7 +88,7 @@ def run(
                 log.info("%s, %s: %s: %s", place, name, found.verdict, found.sentence)
                 cells.append(found)
     rows = tuple(HardCase(one.name, one.title, one.healthy, one.bound) for one in hard)
-    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with())
+    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with() | spent_since(clock))
 
 
 def cell(posed: Posed, choice: SolverChoice) -> Cell:

@@ -119,3 +119,15 @@ def test_a_border_on_faces_of_cells_parts_the_cells() -> None:
     built = AssembledBody(body, BodySettings(element="P2", first_step=1.0))
     built.start(lambda points: points + 0.1 * points[:, [2, 2, 2]] * [1.0, 0.0, 0.0])
     assert built.energy() == pytest.approx((0.01 + 0.02) / 2 * 0.1**2 / 2, rel=1e-12)
+
+
+def test_the_energy_of_a_membrane_is_that_of_its_part_of_a_face() -> None:
+    """A cube stretched to l along x at constant volume; the membrane has a share of y of the face z1: half of its area."""
+    sheet, stretch = make("membrane", on="z1", thickness=0.1, mu=2.0, **{"in": "fascia"}), 1.2
+    mesh, soft = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron"), make("neo_hooke", mu=0.01)
+    body = Body(mesh, (soft, sheet), (), (0.0, 1.0), regions={"fascia": lambda points: points[:, 1]})
+    built = AssembledBody(body, BodySettings(element="P2", first_step=1.0))
+    built.start(lambda points: points * [stretch, stretch**-0.5, stretch**-0.5])
+    density = (stretch**2 + 2 / stretch - 3) / 2
+    assert built.energy() == pytest.approx((0.01 + 0.1 * 2 / 2) * density, rel=1e-12)
+    assert built.linear.symmetric  # so that its negative modes are counted

@@ -8,7 +8,7 @@ import shapes
 
 from fem_reference import effects
 from fem_reference.foundations.errors import MissingSoftware
-from fem_reference.foundations.mesh import TetMesh
+from fem_reference.foundations.mesh import Polylines, TetMesh
 from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
@@ -145,3 +145,20 @@ def test_missing_software_is_named(bent, monkeypatch) -> None:
     monkeypatch.setattr(processes.sys, "executable", "/nowhere/python")
     with pytest.raises(MissingSoftware, match="3 ranks need mpiexec"):
         fenicsx.require(Settings(ranks=3))
+
+
+def test_a_tendon_pulls_at_the_bone_that_it_goes_to() -> None:
+    """The top is lifted by 2 mm, and with it the tendon of a fibre that ends in the middle of a side. Bones take all forces, so
+    that their sum is 0, to the residual; without the tendon's it would be the tendon's.
+    """
+    lift = RigidMotion((0, 0, 1), None, (0.0, 1.0), (0.0, 2.0))
+    tendon = effects.make("tendon", on="top", stiffness="1 N/mm", reach="6 mm")
+    problem = shapes.bar((2, 2, 4), (10.0, 10.0, 40.0), {"bottom": None, "top": lift}, (*MUSCLE, tendon), (0, 1))
+    tied = replace(problem.attached[1], tendon=np.array([40.0, 5.0, 100.0]))
+    fibre = Polylines(np.array([[5.0, 5, 0], [10, 5, 20]]), np.array([0, 2]))
+    outcome, frames = solved(replace(problem, attached=(problem.attached[0], tied), fibres=fibre))
+    assert outcome.status == "converged"
+    last = frames[-1].scalars
+    assert last["force_top_tendon"] > 0.05
+    for axis in "xyz":
+        assert sum(last[f"force_on_{one.bone.name}_{axis}"] for one in problem.attached) == pytest.approx(0, abs=1e-6)

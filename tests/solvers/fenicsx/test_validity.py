@@ -14,7 +14,7 @@ from fem_reference.foundations.loads import RampPoint
 from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
-from fem_reference.geometry.regions import Blended, Near
+from fem_reference.geometry.regions import Around, Blended
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
 from fem_reference.problems.paths import Affine, Along, Rest
@@ -209,7 +209,7 @@ def drawn(session, acting: tuple[Effect, ...], stretch: float):
     gradient = ((stretch - 1, 0.0, 0.0), (0.0, across - 1, 0.0), (0.0, 0.0, across - 1))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0), *acting)
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    half = {"half": Blended(Near(PLANE, 0.5), 0.0)}
+    half = {"half": Blended(Around(PLANE, 0.5), 0.0)}
     body = Body(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)), regions=half)
     return session.solve(body, BodySettings(element="Q1/P0", first_step=0.25, residual=1e-11))
 
