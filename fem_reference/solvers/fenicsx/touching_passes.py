@@ -101,8 +101,8 @@ class Pass:
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
-        """Of pairs of points and facets those that may be at gaps up to ``most`` [mm], and less deep than the radius, by the
-        plane through the middle of the facet and the heights of its nodes above that.
+        """Pairs of points and facets, among those given, that may be at gaps up to ``most`` [mm] and less deep than the radius, by
+        the plane through the middle of the facet and the heights of its nodes above that.
         """
         middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         _, radii = self.other.balls(nodes)
