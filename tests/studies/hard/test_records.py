@@ -105,7 +105,7 @@ def test_a_wrong_file_is_refused(text, message, tmp_path) -> None:
 def test_the_reference_comes_first_and_every_solver_of_muscles_is_there() -> None:
     found = records.choices()
     assert list(found)[:2] == [records.REFERENCE, records.SECOND]
-    assert set(solvers.names("solve")) - {"recorded"} <= set(found)
+    assert set(solvers.names("solve")) - {"recorded", "command"} <= set(found)
     assert "recorded" not in found
 
 
