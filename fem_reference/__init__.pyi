@@ -6,7 +6,8 @@ from fem_reference.effects import make as make_effect
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.version import __version__ as __version__
 from fem_reference.problems.body import Body, Cells, Prescribed
-from fem_reference.problems.shapes import box
+from fem_reference.problems.shapes import box, joined
+from fem_reference.problems.touching import Touching
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.casefile import cases
@@ -35,6 +36,7 @@ __all__ = [
     "MissingSoftware",
     "Prescribed",
     "Run",
+    "Touching",
     "box",
     "calibrate",
     "cases",
@@ -42,6 +44,7 @@ __all__ = [
     "error_bars",
     "export_case",
     "export_runs",
+    "joined",
     "load_case",
     "make_case",
     "make_effect",

@@ -20,6 +20,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
+from fem_reference.problems.touching import Touching
 
 _OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fields are checked too
 Kind = Literal["tetrahedron", "hexahedron"]
@@ -176,9 +177,9 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
-    ``contact``, if any, acts with every bone. ``interval`` [s]: the time between frame numbers, None where nothing depends on
-    time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, where the body does not start at rest;
-    ``regions``: by name those in which effects act.
+    ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
+    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at
+    ``frames[0]``, where the body does not start at rest; ``regions``: by name those in which effects act.
     """
 
     mesh: Cells
@@ -191,6 +192,7 @@ class Body:
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
     regions: Mapping[str, Region] = field(default_factory=dict)
+    touching: tuple[Touching, ...] = ()
 
     task: ClassVar[Task] = "solve_body"
     rest: ClassVar[AtRest] = NOTHING

@@ -23,6 +23,7 @@ from fem_reference.problems.body import (
     reference_nodes,
 )
 from fem_reference.problems.contact import ContactBone, ContactLaw
+from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
 _UNIT = 1e-6  # the tolerance on the length of a unit vector
@@ -49,11 +50,13 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
     _check_prescribed(body.prescribed)
     fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*fixed, *contact, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    loaded = [effect.on for effect in body.effects if isinstance(effect, Load)]
+    used = dict.fromkeys([*fixed, *contact, *loaded, *(on for law in body.touching for on in (law.one, law.other))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(map(str, body.mesh.facets))}")
     _check_regions(body.mesh, tuple(used))
+    check_touching(body.touching, body.mesh.cells, body.mesh.facets)
     _check_needs(body)
     check_agreement(body)
     _check_start(body)
@@ -122,6 +125,7 @@ def _check_rest(body: Body) -> None:
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
     _check_many("bones", body.bones, ContactBone, "bones that may press")
+    _check_many("touching", body.touching, Touching, "parts of the surface that may touch")
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():

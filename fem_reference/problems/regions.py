@@ -47,8 +47,11 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
         place = join(case.place, f"{key}.surface.file")
         given = files.read_surface(case.file(closed.file, f"{key}.surface.file"), closed.unit)
         return Inside(check_closed(Surface(given.points, given.triangles, f"{place}: {given.place}")))
+    if (tets := region.tets) is not None:
+        path = case.file(tets.file, f"{key}.tets.file")
+        return Inside(check_closed(files.read_labelled(path, tets.unit, tets.array, tets.labels)))
     share = region.field
-    assert share is not None  # a CaseRegion record has one of the four
+    assert share is not None  # a CaseRegion record has one of the five
     return Between(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
 
 

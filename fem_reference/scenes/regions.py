@@ -32,6 +32,15 @@ class ClosedSurface(Record):
     unit: LengthUnit
 
 
+class LabelledTets(Record):
+    """All inside the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
+
+    file: str
+    unit: LengthUnit
+    array: str
+    labels: tuple[int, ...] = Field(min_length=1)
+
+
 class ShareOfField(Record):
     """All where the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
 
@@ -49,8 +58,8 @@ class ShareOfField(Record):
 
 
 class CaseRegion(Record):
-    """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface`` and
-    ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are one.
+    """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface``, ``tets``
+    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are one.
     """
 
     name: Name
@@ -58,9 +67,10 @@ class CaseRegion(Record):
     attachment: LengthFromAttachment | None = None
     patch: DepthBelowPatch | None = None
     surface: ClosedSurface | None = None
+    tets: LabelledTets | None = None
     field: ShareOfField | None = None
 
-    _check = one_of("attachment", "patch", "surface", "field")
+    _check = one_of("attachment", "patch", "surface", "tets", "field")
 
     @field_validator("name")
     @classmethod

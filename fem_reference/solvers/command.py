@@ -132,9 +132,8 @@ def of_function(function: Callable[..., None], given: Mapping[str, Any], folder:
     own = {key: value for key, value in given.items() if key in CommandSettings.model_fields}
     called = partial(function, **{key: value for key, value in given.items() if key not in own})
     content = cloudpickle.dumps(called)
-    path = (
-        folder / f"{re.sub(r'\W', '', function.__name__)}-{hashlib.sha256(content).hexdigest()[:16]}.pickle"
-    ).absolute()
+    name = f"{re.sub(r'\W', '', function.__name__)}-{hashlib.sha256(content).hexdigest()[:16]}.pickle"
+    path = (folder / name).absolute()
     files.make_folder(folder)
     path.write_bytes(content)
     paths = os.pathsep.join(str(Path(one).absolute()) for one in sys.path)

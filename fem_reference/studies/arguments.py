@@ -36,9 +36,9 @@ def is_of_body(reference: object, of: object) -> bool:
 
 def check_keys(keys: object) -> Sequence[str]:
     """The keys; InputError unless they are a list of texts."""
-    if isinstance(keys, Sequence) and not isinstance(keys, str) and all(isinstance(key, str) for key in keys):
-        return keys
-    raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
+    if not isinstance(keys, Sequence) or isinstance(keys, str) or not all(isinstance(key, str) for key in keys):
+        raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
+    return keys
 
 
 def check_changes(changes: object) -> None:

@@ -65,6 +65,30 @@ def test_inside_of_a_closed_surface_and_not_of_an_open_one(tmp_path) -> None:
         muscle.setup(bar(tmp_path, inside))
 
 
+@pytest.mark.parametrize("suffix", ["vtu", "msh"])
+def test_tetrahedra_of_a_label_are_a_region(tmp_path, suffix) -> None:
+    """Those below 8 mm of a box beside the bar, of which the file has the labels; a label or array that it has not is refused."""
+    scene = bar(tmp_path, AT_END)
+    mesh = shapes.box((3, 3, 5), (14.0, 14.0, 20.0))
+    labels = np.where(mesh.points[mesh.tets].mean(axis=1)[:, 2] < 8, 7, 1)
+    files.write_field(scene.folder / f"parts.{suffix}", mesh.points - [2, 2, 0], mesh.tets, {}, {"part": labels})
+    table = {"file": f"parts.{suffix}", "unit": "mm", "array": "part", "labels": [7, 9]}
+
+    def of(changes):
+        tendon = {"name": "tendon", "width": "0 mm", "tets": table | changes}
+        return muscle.setup(bar(tmp_path, tendon)).regions["tendon"](
+            np.array([[5.0, 5, 7.9], [5, 5, 8.1], [5, 5, 0.1]])
+        )
+
+    assert of({}).tolist() == [1, 0, 1]
+    for changes, message in (
+        ({"labels": [3]}, "got no such tetrahedra"),
+        ({"array": "region"}, 'an array "region" of integers'),
+    ):
+        with pytest.raises(InputError, match=rf"parts\.{suffix}.*{message}"):
+            of(changes)
+
+
 def test_regions_of_one_name_are_one_and_sizes_and_overlaps_are_stated(tmp_path) -> None:
     other = AT_END | {"attachment": {"name": "insertion", "length": "10 mm"}, "width": "0 mm"}
     fat = {"name": "fat", "width": "0 mm", "surface": {"file": "end.ply", "unit": "mm"}}

@@ -103,7 +103,7 @@ class _Watch:
     def _look(self) -> None:
         begin, passed = time.monotonic(), 0.0
         while not self.done.wait(min(max(_GLANCES[0], _SHARE * passed), _GLANCES[1])):
-            times = processor_times(self.process)
+            times = processor_times(self.process, of_ended=True)
             used, passed = sum(times.values()), time.monotonic() - begin
             self.memory = max(self.memory, *map(peak_memory, times), 0.0)
             if used >= self.limit:

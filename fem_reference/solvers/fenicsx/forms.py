@@ -149,6 +149,8 @@ class Form:
 
     def _regions(self, body: Body, cells: Ints) -> dict[str, Any]:
         """The shares of the quadrature points in the regions in which effects act."""
+        if not regions_named(body.effects):
+            return {}
         points, corners = self.rule[0], reference_nodes(body.mesh.kind, 1)
         within = points + INWARDS * (corners.mean(axis=0) - points)
         return {name: self._known(body, share) for name, share in body.shares(self._places(within, cells)).items()}

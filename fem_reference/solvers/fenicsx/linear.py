@@ -59,7 +59,8 @@ class Factorised:
         self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
 
     def _choose(self, precision: str) -> None:
-        self.precision = precision
+        self.precision, self.entries = precision, self.matrix.getInfo()["nz_used"]
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)  # type: ignore[arg-type]  # as its stubs declare it
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
         self.preconditioner = self.krylov.getPC()
@@ -90,6 +91,8 @@ class Factorised:
 
     def factorise(self) -> None:
         """Factorise the present matrix; ``LinearSolveError`` where this fails."""
+        if self.entries != self.matrix.getInfo()["nz_used"]:  # of a matrix that has grown the factors are others
+            self._choose(self.precision)
         options = PETSc.Options(self.krylov.getOptionsPrefix())
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)

@@ -48,8 +48,9 @@ class ScikitBodySettings(Record):
 
 def _check_known(body: Body) -> None:
     """Raise InputError where a body has a part that this solver knows nothing of."""
-    if body.contact is not None:
-        raise InputError("contact", "bones", "a body without, as this solver knows no contact")
+    if body.contact is not None or body.touching:
+        name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
+        raise InputError(name, got, "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
         want = "springs on facets, as this solver knows no others"
         raise InputError("prescribed", "springs at points of a skin", want)

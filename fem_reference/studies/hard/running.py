@@ -97,13 +97,15 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
     hard, solver = posed.hard, choice.solver
     try:
         if hard.only and solver not in hard.only:
-            return Cell(hard.name, solver, "refused", f"the case is about {', '.join(hard.only)} only: {hard.because}")
+            return Cell(
+                hard.name, solver, "not applicable", f"the case is about {', '.join(hard.only)} only: {hard.because}"
+            )
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
-            return Cell(hard.name, solver, "refused", "nothing but effects acts, and this solver simulates none")
+            return Cell(hard.name, solver, "not applicable", "nothing but effects acts, and this solver simulates none")
         with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:
-        found = Cell(hard.name, solver, "refused", str(error))
+        found = Cell(hard.name, solver, "not applicable", str(error))
     except _Late:
         found = Cell(hard.name, solver, "failed", "timed out: it took too much processor time", "timed out")
     except StalledError as why:
@@ -166,7 +168,7 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
     begins = followed.least_determinant
     if hard.start is not None and begins is not None and not begins[0] > 0:
         said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {blank.status}"
-        return replace(blank, verdict="refused", sentence=said)
+        return replace(blank, verdict="not applicable", sentence=said)
     if blank.status != "converged":
         return stress.unfinished(blank, message, histories, hard.no_solution)
     return stress.judge(blank, histories, hard.contrast)

@@ -23,6 +23,16 @@ def test_time_is_by_the_clock_and_of_the_processor_with_its_own_processes(tmp_pa
     assert ended.limit is None
 
 
+def test_work_of_its_ended_processes_counts_for_the_limit(tmp_path) -> None:
+    """One after the other, each far below it."""
+    work = "import time; b = time.process_time()\nwhile time.process_time() - b < 0.1: pass"
+    ended = run(
+        f"import subprocess, sys\nfor _ in range(90): subprocess.run([sys.executable, '-c', {work!r}])", tmp_path, 0.6
+    )
+    assert ended.limit is not None
+    assert ended.limit[0] == "timed out"
+
+
 def test_what_it_prints_last_and_how_it_ends(tmp_path) -> None:
     ended = run("print('x' * 10**6); print('the end', flush=True); import os; os.abort()", tmp_path)
     assert (ended.said, ended.code) == ("the end", -6)
