@@ -189,15 +189,24 @@ COUNTS = (
     Count("headless docstrings", headless_docstrings, 0),
     Count("modules without a file of tests", untested_modules, 0),
 )
-LINES = 36000
+# Lines of the library: as many without the capabilities that came later, each with what it added.
+LINES = 36_000
+ADDED = {
+    "forces and moment arms, Hill's muscle, decompositions into fibres, estimation, rbf_muscle, viper": 3550,
+    "experiments, credibility, tension at rest, unknown parameters, calibration": 3810,
+    "regions, membranes, tendons that pull": 880,
+    "contact between parts of the surface": 740,
+    "own solvers as commands, load of the machine, answers first": 880,
+}
 
 
 def main(words: list[str]) -> int:
     """Print the counts; the exit status."""
     house = modules()
     total = sum(module.lines for module in house)
-    sys.stdout.write(f"{total:6} of at most {LINES}: lines of the library\n")
-    over = total > LINES
+    most = LINES + sum(ADDED.values())
+    sys.stdout.write(f"{total:6} of at most {most}: lines of the library\n")
+    over = total > most
     for count in COUNTS:
         places = list(count.places(house))
         over |= len(places) > count.most
