@@ -13,6 +13,11 @@ from fem_reference.foundations.records import parse
 
 KEPT = Path(__file__).parent / "measured"
 _SURFACE, _TIME = "surface_deviation.rms", "seconds_processor"
+# Columns of counts of hard cases; "refused" is one word for two verdicts in what was measured before they were told apart.
+_TWO = ("not applicable", "no solution")
+_COUNTED = {verdict: (verdict,) for verdict in VERDICTS if verdict not in _TWO} | {
+    " or ".join(_TWO): (*_TWO, "refused")
+}
 # Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
 _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
@@ -150,6 +155,45 @@ def _credibility_arms() -> str:
     return table("credibility", head, rows)
 
 
+def _uncertainty(found: dict[str, Any]) -> Any:
+    picked = {
+        "parameters": ("key", "title"),
+        "bands": ("quantity", "title", "unit", "error", "refused", "first", "total"),
+        "placed": ("candidate", "quantity", "word", "worst"),
+    }
+    rows = {name: [{key: one[key] for key in keys} for one in found[name]] for name, keys in picked.items()}
+    for one, band in zip(rows["bands"], found["bands"], strict=True):
+        low = [0.0] * len(band["high"]) if band["distance"] else band["low"]
+        one["width"] = max((b - a for a, b in zip(low, band["high"], strict=True) if None not in (a, b)), default=None)
+        one["bar"] = max((bar for bar in band["bar"] or () if bar is not None), default=None)
+    return {"runs": found["runs"], "failures": len(found["failures"]), "seconds": found["seconds"]} | rows
+
+
+def _uncertainty_bands() -> str:
+    measured = kept("uncertainty")["measured"]
+    keys, titles = zip(*((one["key"], one["title"]) for one in measured["parameters"]), strict=True)
+    rows = []
+    for one in measured["bands"]:
+        sizes = (f"{number(one[name])} {one['unit']}" if one[name] else "none" for name in ("width", "bar"))
+        shares = (
+            f"{100 * one['first'][key]:.0f} / {100 * one['total'][key]:.0f} %" if one["first"] else "" for key in keys
+        )
+        rows.append((one["title"], *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
+    return table("uncertainty", ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
+
+
+def _uncertainty_candidates() -> str:
+    measured = kept("uncertainty")["measured"]
+    bands = [one for one in measured["bands"] if not one["refused"]]
+    rows = dict[str, dict[str, str]]()
+    for one in measured["placed"]:
+        beyond = f" by {number(one['worst'], 2)}" if one["worst"] else ""
+        rows.setdefault(one["candidate"], {})[one["quantity"]] = one["word"] + beyond
+    head = ("candidate", *(f"{one['title']}, {one['unit']}" for one in bands))
+    cells = ((f"`{name}`", *(row.get(one["quantity"], "") for one in bands)) for name, row in rows.items())
+    return table("uncertainty", head, cells)
+
+
 def _reference() -> str:
     cost = kept("hip_flexion")["measured"]["cost"]["reference"]
     row = [f"{cost[key]:.0f}" for key in ("unknowns", "load_steps", "newton_iterations", "seconds_processor")]
@@ -221,10 +265,10 @@ def _stress(found: dict[str, Any]) -> Any:
 
 def _stress_solvers() -> str:
     rows = [
-        (f"`{one['solver']}`", *(one.get(verdict, 0) for verdict in VERDICTS))
+        (f"`{one['solver']}`", *(sum(one.get(verdict, 0) for verdict in verdicts) for verdicts in _COUNTED.values()))
         for one in kept("stress")["measured"]["counts"]
     ]
-    return table("stress", ("solver", *VERDICTS), rows)
+    return table("stress", ("solver", *_COUNTED), rows)
 
 
 def _stress_steps() -> str:
@@ -242,6 +286,7 @@ MEASUREMENTS = {
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "stress": Measurement("./fem stress --steps", _stress),
+    "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "credibility": Measurement("./fem page credibility", _credibility),
 }
 TABLES = {
@@ -252,6 +297,8 @@ TABLES = {
     "study_reference": _study_reference,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
+    "uncertainty_bands": _uncertainty_bands,
+    "uncertainty_candidates": _uncertainty_candidates,
     "credibility_grades": _credibility_grades,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,

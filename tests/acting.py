@@ -50,6 +50,7 @@ def is_positive(kind: type[Record], key: str) -> bool:
 
 KINDS = {
     "MPa": "pressure",
+    "mm": "a length",
     "rad": "an angle",
     "tonne/mm^3": "a density",
     "mm/s^2": "acceleration",
@@ -104,5 +105,5 @@ def slope(effect: Energy, stretch: float, step: float = 1e-5) -> float:
 def outcome(effect: Effect, at: State) -> Any:
     """What an effect does: its energy, its traction, or what is elastic."""
     if isinstance(effect, Load):
-        return effect.traction(at, (0.6, 0.0, 0.8))
+        return (effect.potential if effect.stored else effect.traction)(at, (0.6, 0.0, 0.8))
     return effect.energy(at) if isinstance(effect, Energy) else effect.elastic(at)

@@ -92,7 +92,7 @@ def stress(comparison: Comparison) -> Stress:
     surface, numbers = comparison.reference.surface, comparison.reference.numbers
     history = History("kinetic_energy", "mJ", numbers, np.array([0, 1.0, 4.0, 90.0, np.nan]))
     shown = {"history": history, "scene": Scene(surface.points, surface.triangles, surface.points[0]), "bound": 1.0}
-    verdicts = ("ok", "degraded", "failed", "refused", "inconclusive", "failed")
+    verdicts = ("ok", "degraded", "failed", "not applicable", "no solution", "inconclusive")
     places = [(case, solver) for case in ("at_rest", "squeeze") for solver in ("fenicsx", "pbd", "mass_spring")]
     cells = tuple(
         Cell(*place, verdict, f"It is {verdict}.", "converged", seconds=1.0, **shown)

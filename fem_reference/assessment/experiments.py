@@ -102,7 +102,7 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
 
 
 def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
-    """The least and the greatest of what models of muscles differ from muscles by, in a ``quantity``; empty where nobody says."""
+    """The least and greatest difference of models of muscles from muscles, in a ``quantity``; empty where no source says."""
     return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
 
 

@@ -25,6 +25,8 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
+# The share of the machine that other processes kept busy during a run, as a cost of it, and the share from which times are longer.
+LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
 # The type of an error, a bar or a cost.
@@ -68,6 +70,16 @@ class Point:
         """The words that distinguish it from the other points of its solver."""
         name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
         return f"{name}{self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
+
+    @property
+    def load(self) -> float:
+        """The share of the machine that other processes kept busy during its run; NaN where that is not known."""
+        return self.costs.get(LOAD, math.nan)
+
+    @property
+    def is_loaded(self) -> bool:
+        """True where its time was measured on a machine that was busy with other work."""
+        return self.load > LOADED
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
         """Its error and its cost, None where one is not known or not above zero."""

@@ -57,7 +57,8 @@ class Margins:
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True where
-    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them.
+    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them; ``loads``: of all
+    settings, the share of the machine that other processes kept busy while they were timed.
     """
 
     best: Expected | None
@@ -66,14 +67,43 @@ class Recommendation:
     margins: Margins
     of: tuple[str, ...]
     measured: bool
+    loads: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class KnownSettings:
+    """All ``settings`` for a case, with ``margins``, from the cases ``of``; ``measured``: True where that is the case itself."""
+
+    settings: tuple[Expected, ...]
+    margins: Margins
+    of: tuple[str, ...]
+    measured: bool
 
 
 def recommend(
     features: Features, case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
-    """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the most accurate whose time
-    per frame [s] is at most ``limits["time"]``; with both limits, the cheapest within both. Only studies with the metric count.
-    An error counts as measured plus the bar of the truth, as in the tables of a study.
+    """The setting for a ``case`` that is :func:`chosen` by ``limits`` of all that :func:`known_settings` has."""
+    known = known_settings(features, case, studies, metric)
+    best, nearest = chosen(known.settings, limits)
+    loads = tuple(one.point.load for one in known.settings)
+    return Recommendation(best, nearest, len(known.settings), known.margins, known.of, known.measured, loads)
+
+
+def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
+    """The cheapest setting whose error is at most ``limits["error"]``, or the most accurate whose time per frame [s] is at most
+    ``limits["time"]``, with both limits the cheapest within both; without one, the setting that misses the limits least.
+    """
+    most = {"error": math.inf, "time": math.inf} | dict(limits)
+    fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
+    rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
+    best = min(fitting, key=rank, default=None)
+    return best, None if best else min(known, key=lambda one: one.misses(limits), default=None)
+
+
+def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> KnownSettings:
+    """The settings for a ``case`` with these features; only studies with the ``metric`` count. An error counts as measured plus
+    the bar of the truth, as in the tables of a study.
     """
     studies = [study for study in studies if metric in study.units]
     own = [study for study in studies if study.case == case and _is_same(features, study.features)]
@@ -81,12 +111,7 @@ def recommend(
     margins = Margins() if own else _margins(others, metric)
     known = _measured(own[0], metric) if own else list(_expected(features, others, metric, margins))
     of = (case,) if own else tuple(study.case for study in alike(features, others))
-    most = {"error": math.inf, "time": math.inf} | dict(limits)
-    fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
-    rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
-    best = min(fitting, key=rank, default=None)
-    nearest = None if best else min(known, key=lambda one: one.misses(limits), default=None)
-    return Recommendation(best, nearest, len(known), margins, of, bool(own))
+    return KnownSettings(tuple(known), margins, of, bool(own))
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field
@@ -12,8 +12,9 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.io.texts import plain
 
-Verdict = Literal["ok", "degraded", "failed", "refused", "inconclusive"]
-VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconclusive")
+# Not applicable: the solver does not take the case. No solution: physics has no answer, and the solver says so.
+Verdict = Literal["ok", "degraded", "failed", "not applicable", "no solution", "inconclusive"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
@@ -124,24 +125,26 @@ def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, for a run that ended with another status: failed; or refused where it came to a limit point, or came some way and
-    found that there is ``no_solution``, for the given reason.
+    """``cell``, for a run that ended with another status: failed; or no solution where it came to a limit point, or came some way
+    and found that there is ``no_solution``, for the given reason.
     """
     shown = _decisive(cell, weighed)
     if cell.status == "limit point":
-        return replace(shown, verdict="refused", sentence=message)
+        return replace(shown, verdict="no solution", sentence=message)
     if no_solution and cell.status not in _OTHER_REASONS and len(weighed[0][1].numbers) > 1:
         sentence = f"as it should, for {no_solution}: {cell.status}: {message}"
-        return replace(shown, verdict="refused", sentence=sentence)
+        return replace(shown, verdict="no solution", sentence=sentence)
     return replace(shown, verdict="failed", sentence=f"{cell.status}: {message}")
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's own result, if any: no plain success; refused where there is ``no_solution``."""
+    """``cell`` with a ``doubt`` about the solver's own result, if any: no plain success; right where there is ``no_solution``."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:
-        return replace(cell, verdict="refused", sentence=f"as it should, for {no_solution}: {doubt}; {cell.sentence}")
+        return replace(
+            cell, verdict="no solution", sentence=f"as it should, for {no_solution}: {doubt}; {cell.sentence}"
+        )
     return replace(cell, verdict="degraded", sentence=f"{doubt}; {cell.sentence}")
 
 

@@ -17,9 +17,9 @@ from fem_reference.report.asked import Asked, Part, written
 from fem_reference.report.overview import comparison_text
 from fem_reference.report.pages import Page
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import HOME, Candidate, Case, Expectation
+from fem_reference.scenes.case import COMMAND, HOME, Candidate, Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.solvers import fenicsx, recorded
+from fem_reference.solvers import command, fenicsx, recorded
 from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
 
@@ -88,6 +88,20 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
     return recorded.choice(Path(text), unit, "--candidate"), "--candidate"
 
 
+def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = ()) -> tuple[Candidate, ...]:
+    """The solver of ``--solver-command`` as a candidate with a name that none of the ``others`` has; nothing without one."""
+    if options.solver_command is None:
+        return ()
+    own = command.choice(options.solver_command, Path.cwd(), "--solver-command")
+    check_names([own.name, *(one if isinstance(one, str) else one.name for one in others)])
+    return (own,)
+
+
+def command_parts(own: Iterable[Candidate]) -> list[Part]:
+    """The part of a page that a command of ``--solver-command`` makes different."""
+    return [Part(("--solver-command", one.settings["command"]), one.name) for one in own]
+
+
 def check_names(names: list[str]) -> None:
     """InputError where two candidates have one name, or one has that of the reference."""
     for name in names:
@@ -129,9 +143,11 @@ def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
     found = tuple(chosen)
     if found == case.candidate:
         return ()
+    own = command_parts(one for one in found if one.solver == COMMAND)
+    found = tuple(one for one in found if one.solver != COMMAND)
     foreign = [one.solver == "recorded" and one not in case.candidate for one in found]
     words = [one.settings["folder"] if read else one.name for one, read in zip(found, foreign, strict=True)]
-    return tuple(Part(("--candidate", word), one.name) for word, one in zip(words, found, strict=True))
+    return (*own, *(Part(("--candidate", word), one.name) for word, one in zip(words, found, strict=True)))
 
 
 def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[str, Any], text: str) -> None:

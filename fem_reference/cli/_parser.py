@@ -38,6 +38,11 @@ _SHARED: dict[str, dict[str, Any]] = {
         "help": "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated",
     },
     "--unit": {"help": "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"},
+    "--solver-command": {
+        "metavar": "COMMAND",
+        "help": "your own solver as a candidate: a command with {scene} and {out}, and settings in braces that the candidate.toml "
+        "here describes",
+    },
     "--error-bar": {
         "action": "store_true",
         "help": "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press",

@@ -7,7 +7,7 @@ from fem_reference import solvers
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.cli import DONE, SOLVER_FAILED, write_output
-from fem_reference.cli._cases import asked, candidates, checked_bench, choose, compared, publish, scene_of
+from fem_reference.cli._cases import asked, candidates, checked_bench, choose, compared, own_solver, publish, scene_of
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
@@ -28,6 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)
     ours = "a solver of ours as a candidate, with its standard settings where the case has none; may be repeated"
     parser.add_argument("--solver", action="append", default=[], metavar="NAME", help=ours)
+    share(parser, "--solver-command")
     past = "what the candidate was, and write the page of what changed: a baseline of check, a stored run, a folder of frames"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
@@ -43,8 +44,11 @@ def run(options: argparse.Namespace) -> int:
     for name in options.solver:
         if name not in known:
             raise InputError("--solver", f'"{name}"', f"one of {', '.join(known)}")
-    wanted = [*(options.candidate or []), *options.solver] or [candidate.name for candidate in scene.candidate]
-    chosen = [choose(scene, text, options.unit) for text in wanted]
+    own = [(one, "--solver-command") for one in own_solver(options)]
+    wanted = [*(options.candidate or []), *options.solver]
+    if not own and not wanted:
+        wanted = [candidate.name for candidate in scene.candidate]
+    chosen = [*own, *(choose(scene, text, options.unit) for text in wanted)]
     return compared(scene, options, chosen) if options.against is None else _against(scene, options, chosen)
 
 

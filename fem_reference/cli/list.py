@@ -58,7 +58,8 @@ def _settings(name: str) -> dict[str, Any]:
     for offer in solvers.offers(name):
         fields = offer.settings.model_fields
         found |= {key: REQUIRED for key, field in fields.items() if field.is_required()}
-        found |= offer.settings.model_construct().model_dump(mode="json", warnings=False)
+        stated = {*offer.settings.model_fields}  # and no hash of what is not there
+        found |= offer.settings.model_construct().model_dump(mode="json", include=stated, warnings=False)
     return found
 
 

@@ -8,7 +8,16 @@ from fem_reference import report
 from fem_reference.assessment import credibility
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
-from fem_reference.cli._cases import case_part, check_names, checked_bench, own_candidates, publish, status
+from fem_reference.cli._cases import (
+    case_part,
+    check_names,
+    checked_bench,
+    command_parts,
+    own_candidates,
+    own_solver,
+    publish,
+    status,
+)
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, credibility_page, estimation_page, field_page, ranking_page
@@ -41,7 +50,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
     solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres (half an hour)"
     parser.add_argument("--solve", action="store_true", help=solving)
-    share(parser, "--unit", "--name")
+    share(parser, "--solver-command", "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -50,11 +59,12 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("page", f"--solve for {options.name}", f"it for {ESTIMATION} only")
     if options.name == TABLE:
         return _table(options)
-    if options.name in (CLAIMS, ESTIMATION) and not (options.candidate or options.unit):
+    foreign = options.candidate or options.unit or options.solver_command
+    if options.name in (CLAIMS, ESTIMATION) and not foreign:
         return _claims(options) if options.name == CLAIMS else _estimation(options)
-    if options.case or options.candidate or options.unit:
+    if options.case or foreign:
         without_cases = options.name in (EXAMPLES, CREDIBILITY)
-        given = "--case, --candidate or --unit" if without_cases else "--candidate or --unit"
+        given = f"{'--case, ' if without_cases else ''}--candidate, --unit or --solver-command"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
     return _credibility(options) if options.name == CREDIBILITY else _examples(options)
 
@@ -79,10 +89,14 @@ def _table(options: argparse.Namespace) -> int:
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+    own = own_solver(options)
+    for name in scenes if own else ():
+        foreign.setdefault(name, []).extend(own)
+        check_names([one.name for one in foreign[name]])
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    pairs = [(case, one) for case, found in foreign.items() for one in found]
+    pairs = [(case, one) for case, found in foreign.items() for one in found if one not in own]
     more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
-    asked = _asked(scenes.values(), options, more)
+    asked = _asked(scenes.values(), options, [*more, *command_parts(own)])
     publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 

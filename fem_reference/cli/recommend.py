@@ -4,13 +4,14 @@ import argparse
 import math
 import re
 
+from fem_reference.assessment.answers import answers
 from fem_reference.assessment.judge import in_unit
-from fem_reference.assessment.recommendation import recommend
+from fem_reference.assessment.recommendation import known_settings, recommend
 from fem_reference.cli import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.cli._cases import scene_of
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
-from fem_reference.report.recommendation_texts import facts, text
+from fem_reference.report.recommendation_texts import answer_facts, answer_texts, facts, text
 from fem_reference.report.study_page import MAIN
 from fem_reference.scenes import casefile
 from fem_reference.studies import cost
@@ -35,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting; the exit status is 1 where none meets the request."""
+    """Recommend a setting, or without a request those of the page of a study; the exit status is 1 where none meets a request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}
@@ -50,10 +51,13 @@ def run(options: argparse.Namespace) -> int:
         each = _PER_FRAME.sub("", given) if rate is None else given.removesuffix(rate)
         value = _number(options.time, each, "1" if rate else "s", "--time")
         limits["time"] = 1 / value if rate else value
+    own = features(scene, Bench(scene, out(options) / "runs").setup())
     if not limits:
-        raise InputError("recommend", "nothing asked for", "--error or --time")
-    setup = Bench(scene, out(options) / "runs").setup()
-    found = recommend(features(scene, setup), scene.name, studies, metric, limits)
+        every = answers(known_settings(own, scene.name, studies, metric).settings)
+        lines = answer_texts(every, units[metric])
+        write_output({"metric": metric, "answers": answer_facts(every)}, "\n".join(lines), options)
+        return DONE if all(one.best for one in every[:-1]) else VERDICT_FAIL
+    found = recommend(own, scene.name, studies, metric, limits)
     said = text(found, scene.name, metric, units[metric], limits.get("error", math.inf))
     write_output(facts(found, metric), said, options)
     return DONE if found.best else VERDICT_FAIL

@@ -4,11 +4,12 @@ import argparse
 
 from fem_reference.assessment.stress import facts
 from fem_reference.cli import DONE
-from fem_reference.cli._cases import publish
+from fem_reference.cli._cases import command_parts, own_solver, publish
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part
+from fem_reference.scenes.case import COMMAND
 from fem_reference.studies.hard import records, running
 
 HELP = "run the hard cases by every solver, and write a page that shows which solvers stay stable"
@@ -19,12 +20,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
-    parser.add_argument("--solver", default=[], choices=list(records.choices()), metavar="NAME", help=only)
+    parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on so many other meshes of each case as well, a little different at random"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
-    share(parser, "--name")
+    share(parser, "--solver-command", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,9 +37,11 @@ def run(options: argparse.Namespace) -> int:
             want = f"--solver {records.REFERENCE} too, which alone it is about"
             raise InputError(name, f"it with {', '.join(options.solver)} alone", want)
     hard = records.read_all(tuple(options.names))
-    found = running.run(hard, options.solver, in_steps=options.steps, jitters=options.jitters)
+    own = own_solver(options, list(records.choices()))
+    found = running.run(hard, options.solver, own, in_steps=options.steps, jitters=options.jitters)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--solver", name), name) for name in options.solver]
+    parts += command_parts(own)
     parts += [Part(("--steps",), "steps")] if options.steps else []
     parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
     asked = Asked("stress", "stress", tuple(parts))

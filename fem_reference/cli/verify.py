@@ -7,6 +7,7 @@ from fem_reference.assessment.catalogue import Verification
 from fem_reference.cli import DONE, SOLVER_FAILED, VERDICT_FAIL
 from fem_reference.cli._cases import publish
 from fem_reference.cli._parser import share
+from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.foundations.version import __version__
 from fem_reference.report import verify_page
 from fem_reference.report.asked import Asked, Part
@@ -32,9 +33,9 @@ def run(options: argparse.Namespace) -> int:
     catalogue = runner.entries()
     wrong = frozenset(runner.choose(catalogue, options.negative_control, "--negative-control"))
     meant = {*runner.choose(catalogue, options.names, "NAME"), *wrong}
-    begin = time.perf_counter()
+    begin, clock = time.perf_counter(), MachineTime.now()
     results = runner.run([entry for name, entry in catalogue.items() if name in meant or not meant], lab, wrong)
-    made_with = {"fem_reference": __version__, **versions()}
+    made_with = {"fem_reference": __version__, **versions(), **spent_since(clock)}
     measured = Verification(results, time.perf_counter() - begin, made_with)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]

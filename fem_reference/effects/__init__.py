@@ -12,9 +12,9 @@ never branches on a parameter and uses it with operators and ``state.functions``
 
 import importlib
 import pkgutil
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -23,33 +23,16 @@ from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit, Range
-from fem_reference.foundations.loads import Shape, Wrench
+from fem_reference.foundations.loads import RampPoint, Shape, Wrench
+from fem_reference.foundations.material_point import REST, fibre_tension
+from fem_reference.foundations.material_point import FieldState as FieldState
+from fem_reference.foundations.material_point import Moduli as Moduli
+from fem_reference.foundations.material_point import Place as Place
 from fem_reference.foundations.material_point import State as State
-from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
 __path__ += outside.folders()
-
-
-class Moduli(NamedTuple):
-    """Stiffness at rest [MPa]: ``shear`` (across the fibres, where there are some), ``bulk``, and the stress that scales the
-    stiffness of ``fibres``; 0 where there is none.
-    """
-
-    shear: float = 0.0
-    bulk: float = 0.0
-    fibres: float = 0.0
-
-
-class RampPoint(Record):
-    """The amount of an effect at a frame number: up to a thousand times its parameters."""
-
-    frame: float
-    amount: float = Field(ge=0, le=1000)
-
-    def __str__(self) -> str:
-        return f"{self.amount:g} at frame {self.frame:g}"
 
 
 class Effect(Record):
@@ -100,7 +83,8 @@ class Effect(Record):
     @property
     def parameters(self) -> list[tuple[str, Any, str]]:
         """Name, value and unit of each parameter."""
-        return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in type(self).model_fields.items()]
+        fields = type(self).model_fields.items()
+        return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in fields if name != "region"]
 
 
 class Ramped(Effect):
@@ -122,13 +106,43 @@ class Ramped(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable."""
+    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable. It acts everywhere, or in a
+    ``region`` of the body (``in``): by the share that a point has in it.
+    """
 
     stored: ClassVar[bool] = True
+    region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
+
+    @field_validator("region")
+    @classmethod
+    def _check_region(cls, region: str) -> str:
+        if "momentum" in cls.needs:
+            raise ValueError("no region: the whole body moves")
+        return region
+
+    @property
+    def title(self) -> str:
+        """Its name among the effects of a scene, which may include others of its kind in other regions."""
+        return type(self).__name__ + (f" in {self.region}" if self.region else "")
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``."""
+        """Energy per rest volume [MPa] at ``state``, of a point that is wholly in its region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
+
+    def weighted(self, state: State) -> Any:
+        """Energy per rest volume [MPa] at ``state``, by the share of the point in its region."""
+        return state.share(self.region) * self.energy(state) if self.region else self.energy(state)
+
+
+def region_of(effect: Record) -> str:
+    """The region in which an ``effect`` acts, as ``State.share`` reads it."""
+    return str(getattr(effect, "region", ""))
+
+
+def regions_named(effects: Iterable[Record]) -> list[str]:
+    """The names of the regions in which ``effects`` act, or outside of which, each once."""
+    named = filter(None, map(region_of, effects))
+    return list(dict.fromkeys(region.removeprefix(REST) for region in named))
 
 
 class VolumeLaw(Energy):
@@ -159,9 +173,10 @@ class PassiveFibres(Energy):
 
 
 class Load(Effect):
-    """A load on the part ``on`` of the surface."""
+    """A load on the part ``on`` of the surface. Where it is ``stored`` it has an energy per rest area, else a traction."""
 
     outer: ClassVar[bool] = True
+    stored: ClassVar[bool] = False
     example: ClassVar[dict[str, Any]] = {"on": "top"}
     on: str
 
@@ -173,6 +188,10 @@ class Load(Effect):
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""
         raise NotImplementedError(f"{type(self).__name__} has no traction")
+
+    def potential(self, state: State, normal: Sequence[Any]) -> Any:
+        """Energy per rest area [N/mm] for the outward unit normal ``normal`` (3,) at rest."""
+        raise NotImplementedError(f"{type(self).__name__} has no energy")
 
 
 class Interaction(Effect):
@@ -201,32 +220,12 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
     """
     state = elastic_state(acting, state)
-    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in acting if isinstance(effect, Energy))
+    return sum(law.weighted(replace(state, amount=amount)) for law, amount in acting if isinstance(law, Energy))
 
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
     """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
     return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
-
-
-@dataclass(frozen=True)
-class FieldState:
-    """A scalar function at a point: its ``value``, ``gradient`` (one entry per coordinate) and, for an unknown, ``laplacian``."""
-
-    value: Any
-    gradient: Sequence[Any]
-    laplacian: Any = 0.0
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point at which a field effect acts: the ``position`` (x, y, z as far as they exist), the ``functions`` of formulas, and
-    ``upper``, the share of the element above the mean y of the vertices.
-    """
-
-    position: Sequence[Any]
-    functions: Mapping[str, Any]
-    upper: Any
 
 
 class FieldEffect(Record):

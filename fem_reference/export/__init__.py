@@ -5,11 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fem_reference.export import febio, febio_contact, open_formats
+from fem_reference.export import febio, febio_contact
 from fem_reference.export.folders import check, new_folder, write_text
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers.common import open_formats
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +42,7 @@ def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, f
 
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format) -> None:
-    open_formats.write(case, problem, folder)
+    open_formats.write(problem, folder, {"case": case.name, "title": case.title})
     write_text(folder / "candidate.toml", case)
     write_text(folder / "README.md", case, more=_FEBIO_FILES if form == "febio" else "")
     if form == "febio":

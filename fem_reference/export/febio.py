@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from fem_reference.effects import name_of
+from fem_reference.effects import name_of, region_of
 from fem_reference.effects.contact import Contact
 from fem_reference.effects.fibre_passive import FibrePassive
 from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
@@ -43,6 +43,9 @@ def check(case: MuscleCase) -> None:
         if not isinstance(effect, SAME):
             want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
             raise InputError(join(case.place, f"effect[{i}]"), f'"{name_of(effect)}"', want)
+        if region := region_of(effect):
+            want = "a law of the whole muscle: regions with a smooth border are not exported to FEBio"
+            raise InputError(join(case.place, f"effect[{i}].in"), f'"{region}"', want)
     matrix = (NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"
     volume = (Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"
     for kinds, got in (matrix, volume):

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.export.open_formats import write_csv
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io.formats.vtk import DataBlock
@@ -15,6 +14,7 @@ from fem_reference.metrics import MeasurementContext, find
 from fem_reference.metrics.moment_arm import turning
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Run
+from fem_reference.solvers.common.open_formats import write_csv
 
 FILE = "forces.csv"
 _ARMS = ("mean", "least", "greatest")

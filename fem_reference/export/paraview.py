@@ -155,6 +155,8 @@ def interior(made: Results, frame: float) -> DataBlock:
     """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
+    middles = mesh.points[mesh.tets].mean(axis=1)
+    cells |= {f"region_{name}": region(middles) for name, region in made.regions.items()}
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
     displacement = np.zeros_like(mesh.points)

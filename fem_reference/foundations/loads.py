@@ -1,11 +1,23 @@
-"""External loads on a body: their force and moment, and what they depend on of its shape."""
+"""Loads on a body: their amounts over time, their force and moment, and what they depend on of its shape."""
 
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import Record
+
+
+class RampPoint(Record):
+    """The amount of an effect at a frame number: up to a thousand times its parameters."""
+
+    frame: float
+    amount: float = Field(ge=0, le=1000)
+
+    def __str__(self) -> str:
+        return f"{self.amount:g} at frame {self.frame:g}"
 
 
 class Wrench(NamedTuple):

@@ -1,8 +1,8 @@
 """The state at a point of a body, with the invariants that laws are written in, and the functions that they may call."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,19 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return np.where(x > limit, then, otherwise)
 
 
+# Before the name of a region: the rest of the body.
+REST = "not "
 NUMPY = Functions(np.exp, np.log, np.sqrt, np.cos, np.sin, _above)
+
+
+class Moduli(NamedTuple):
+    """Stiffness at rest [MPa]: ``shear`` (across the fibres, where there are some), ``bulk``, and the stress that scales the
+    stiffness of ``fibres``; 0 where there is none.
+    """
+
+    shear: float = 0.0
+    bulk: float = 0.0
+    fibres: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +50,8 @@ class State:
     unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
     none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
     step starts from, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] where velocities alone would lead it, and
-    ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
+    ``rate`` [1/s] one over the time that it takes, 0 where no time passes; ``regions``: the share, from 0 to 1, that the point has
+    in each region of the body.
     """
 
     F: Sequence[Sequence[Any]]
@@ -50,7 +63,16 @@ class State:
     predicted: Sequence[Any] = (0.0, 0.0, 0.0)
     F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rate: Any = 0.0
+    regions: Mapping[str, Any] = field(default_factory=dict)
     functions: Functions = NUMPY
+
+    def share(self, region: str) -> Any:
+        """The share, from 0 to 1, that the point has in a ``region``: a name, ``"not NAME"`` for the rest of the body, or ``""``
+        for all of it.
+        """
+        if region.startswith(REST):
+            return 1 - self.regions[region.removeprefix(REST)]
+        return self.regions[region] if region else 1.0
 
     @property
     def J(self) -> Any:
@@ -105,6 +127,26 @@ class State:
         """``x``, or the nearer bound where it lies beyond the bounds."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))
+
+
+@dataclass(frozen=True)
+class FieldState:
+    """A scalar function at a point: its ``value``, ``gradient`` (one entry per coordinate) and, for an unknown, ``laplacian``."""
+
+    value: Any
+    gradient: Sequence[Any]
+    laplacian: Any = 0.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point at which a field effect acts: the ``position`` (x, y, z as far as they exist), the ``functions`` of formulas, and
+    ``upper``, the share of the element above the mean y of the vertices.
+    """
+
+    position: Sequence[Any]
+    functions: Mapping[str, Any]
+    upper: Any
 
 
 def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:

@@ -62,6 +62,21 @@ def _check_file_name(name: str) -> str:
     return name
 
 
+def check_once(names: Sequence[str], place: str) -> None:
+    """Raise InputError where one of ``names`` is there twice."""
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(place, f'the name "{twice}" twice', "every name once")
+
+
+def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str) -> None:
+    """Raise InputError where one of the ``uses``, (key, name) each, is of a name that is not ``known``."""
+    for key, name in uses:
+        if name not in known:
+            want = f"one of {', '.join(known)}" if known else "a name that is there: there is none"
+            raise InputError(join(place, key), f'"{name}"', want)
+
+
 _SHOWN = 12  # errors of one file
 # What pages and messages call something.
 _LONGEST_NAME = 100

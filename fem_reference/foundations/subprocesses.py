@@ -3,6 +3,7 @@
 They import this copy of the package and nothing from the folder that they are started in.
 """
 
+import math
 import os
 import resource
 import shutil
@@ -13,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple, Self
 
 from filelock import FileLock, Timeout
 
@@ -65,9 +67,9 @@ def forget_peak_memory() -> None:
         Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
 
-def processor_times(process: int) -> dict[int, float]:
-    """The processor time [s] by number of a ``process`` and of each that descends from it and has not ended; nothing where the
-    system does not say.
+def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]:
+    """The processor time [s] by number of a ``process`` and of each that descends from it and has not ended, with that of the ended
+    ones that it waited for if ``of_ended``; nothing where the system does not say.
     """
     parents, times = dict[int, int](), dict[int, float]()
     for path in Path("/proc").glob("[0-9]*/stat"):
@@ -75,7 +77,7 @@ def processor_times(process: int) -> dict[int, float]:
             fields = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
             number = int(path.parent.name)
             parents[number] = int(fields[1])
-            times[number] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+            times[number] = sum(map(int, fields[11 : 15 if of_ended else 13])) / os.sysconf("SC_CLK_TCK")
     found, size = {process} & set(times), 0
     while len(found) > size:
         size = len(found)
@@ -83,12 +85,47 @@ def processor_times(process: int) -> dict[int, float]:
     return {number: times[number] for number in found}
 
 
-def peak_memory() -> float:
-    """The most memory [MB] since then, or since this process began."""
+class MachineTime(NamedTuple):
+    """A moment: by the clock [s], the processor time [s] of this process with all that descend from it, and that of all processes
+    of the machine, NaN where the system does not say.
+    """
+
+    seconds: float
+    ours: float
+    all: float
+
+    @classmethod
+    def now(cls) -> Self:
+        """This moment."""
+        busy = math.nan
+        with suppress(OSError, ValueError):
+            user, nice, system, _, _, *interrupts = map(
+                int, Path("/proc/stat").read_text().splitlines()[0].split()[1:9]
+            )
+            busy = (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
+        return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
+
+    def load(self) -> float | None:
+        """The share of the machine that other processes have kept busy since then, None where the system does not say."""
+        now = MachineTime.now()
+        capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
+        share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
+        return None if math.isnan(share) else min(max(share, 0.0), 1.0)
+
+
+def spent_since(before: MachineTime) -> dict[str, str]:
+    """The processor time of this process since a moment and the load by other processes, as provenance of times by the clock."""
+    ours, load = MachineTime.now().ours - before.ours, before.load()
+    found = {"processor time": f"{ours:.1f} s"}
+    return found if load is None else found | {"load by other processes": f"{100 * load:.0f} % of the machine"}
+
+
+def peak_memory(process: int | None = None) -> float:
+    """The most memory [MB] since then, or since this process began; of another ``process``, 0 where the system does not say."""
     with suppress(OSError, StopIteration):
-        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        lines = Path(f"/proc/{process or 'self'}/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return 0.0 if process else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 @contextmanager

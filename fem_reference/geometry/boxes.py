@@ -51,8 +51,13 @@ def around(points: Floats, reach: Floats) -> Boxes:
 
 def touching(one: Boxes, other: Boxes) -> tuple[Ints, Ints]:
     """The boxes (k,) and (l,) of either set that may touch one of the other set: all that do, and few that do not."""
-    others = _near(one, np.arange(one.low.shape[1]), other)
+    others = reached(one, other)
     return _near(other, others, one), others
+
+
+def reached(one: Boxes, other: Boxes) -> Ints:
+    """The boxes (k,) of ``other`` that may touch one of the first set: all that do, and few that do not."""
+    return _near(one, np.arange(one.low.shape[1]), other)
 
 
 def _near(one: Boxes, some: Ints, other: Boxes) -> Ints:

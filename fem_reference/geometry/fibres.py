@@ -133,6 +133,18 @@ class NearestLine:
         return middles, (along / np.maximum(lengths, np.finfo(float).tiny)[:, None])[lengths > 0]
 
 
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """The ``directions`` of fibres, each turned by a matrix (3, 3)."""
+
+    directions: Directions
+    matrix: Floats
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:
+        """Unit vectors (n, 3) at rest ``points`` (n, 3) in ``cells`` (n,)."""
+        return np.asarray(self.directions(cells, points) @ self.matrix.T)
+
+
 def _slopes(mesh: TetMesh, values: Floats) -> Floats:
     """The gradient (k, 3) in each tet of ``values`` (n,) at the points."""
     corners = mesh.points[mesh.tets]

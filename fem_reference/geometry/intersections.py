@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, normals
 from fem_reference.geometry.boxes import boxes_of, touching
+from fem_reference.geometry.near_pairs import near_pairs
 
 
 def self_intersections(surface: Surface) -> Ints:
@@ -18,7 +19,12 @@ def self_crossings(surface: Surface) -> Ints:
 
     An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap in one plane.
     """
-    _, pairs, _ = predicates.find_self_intersections(np.array(surface.points), np.array(surface.triangles))
+    near = near_pairs(surface, surface)
+    some = np.arange(len(surface.triangles)) if near is None else np.unique(near)
+    if not len(some):
+        return np.zeros((0, 2), np.int64)
+    _, found, _ = predicates.find_self_intersections(np.array(surface.points), surface.triangles[some])
+    pairs = some[found]
     first, second = pairs.T
     hit = np.zeros(len(pairs), bool)
     for edges, faces in ((first, second), (second, first)):
@@ -29,7 +35,8 @@ def self_crossings(surface: Surface) -> Ints:
 
 def crossings(one: Surface, other: Surface) -> Ints:
     """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly, by predicates of Shewchuk 1997."""
-    near = touching(boxes_of(one), boxes_of(other))
+    found = near_pairs(other, one)  # its grid is over the second
+    near = touching(boxes_of(one), boxes_of(other)) if found is None else tuple(map(np.unique, found.T[::-1]))
     if not all(map(len, near)):
         return np.zeros((0, 2), np.int64)
     points = [

@@ -64,6 +64,12 @@ class Quadric:
             moved = moved - (inside * value / np.maximum(np.sum(slope**2, axis=1), 1e-12))[:, None] * slope
         return np.asarray(moved)
 
+    def deepest(self, begins: Floats, ends: Floats) -> Floats:
+        """The shares of the lengths of segments from ``begins`` to ``ends`` (..., 3) at which the level is least."""
+        one, other = self._own(begins) / self.radii, self._own(ends) / self.radii
+        along = other - one
+        return np.asarray(np.clip(-np.vecdot(one, along) / np.maximum(np.vecdot(along, along), 1e-300), 0, 1))
+
     def _own(self, points: Floats) -> Floats:
         return np.asarray((points - self.pose[:3, 3]) @ self.pose[:3, :3])
 

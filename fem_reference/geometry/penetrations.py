@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.boxes import around, boxes_of, touching
+from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
@@ -90,9 +90,11 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
     The sign is that of the angle-weighted normal at the closest point (Baerentzen and Aanaes 2005, doi 10.1109/TVCG.2005.49).
     """
     found, some = np.zeros(len(points)), _in_box(body, points)
+    if not len(some):
+        return found
     corners = np.unique(body.triangles[known]) if len(known) else np.arange(len(body.points))
     reach = cKDTree(body.points[corners]).query(points[some])[0]
-    near = touching(around(points[some], reach), boxes_of(body))[1]
+    near = reached(around(points[some], reach), boxes_of(body))
     triangles = body.triangles[near][triangle_areas(body.points, body.triangles[near]) > 0]
     if len(triangles):
         vertices, numbers = np.unique(triangles, return_inverse=True)

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.obstacles import SmoothSurface, Touch
+from fem_reference.geometry.obstacles import Quadric, SmoothSurface, Touch
 from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, met, taut, touching
 
 # Steps of a geodesic; the error of its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
 _STEPS = 60
 # Newton's iterations, their end [of the distance between the ends] and the step of their finite differences.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
-# So many points of a path are looked at for whether it crosses an obstacle.
+# So many points of a path are looked at for whether it crosses an obstacle, beside the deepest of its chords.
 _CHECKED = 200
 
 
@@ -175,14 +175,26 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
 
 def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
     """The paths (n,) that cross an obstacle or are longer than the string, but for what its chords cut off."""
-    count, shares = len(string), np.linspace(0, 1, _CHECKED)
-    points = found.at(np.repeat(np.arange(count), _CHECKED), np.tile(shares, count))
+    count = len(string)
+    even = np.broadcast_to(np.linspace(0, 1, _CHECKED), (count, _CHECKED))
+    shares = np.stack([*even.T, *(_deepest(one, found) for one in obstacles if isinstance(one, Quadric))], axis=1)
+    points = found.at(np.repeat(np.arange(count), shares.shape[1]), shares.ravel())
     wrong = ~(found.lengths <= 1.02 * np.linalg.norm(np.diff(string, axis=1), axis=2).sum(axis=1))
     for obstacle in obstacles:
         value, slope = obstacle.level(points)
         away = value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
-        wrong |= ~(away >= -1e-4 * obstacle.bend).reshape(count, _CHECKED).all(axis=1)
+        wrong |= ~(away >= -1e-4 * obstacle.bend).reshape(shares.shape).all(axis=1)
     return wrong
+
+
+def _deepest(obstacle: Quadric, found: Winding) -> Floats:
+    """The shares (n,) of the paths' lengths at which their chords are deepest in an obstacle, however small it is."""
+    begins, ends = found.knots[:, :-1], found.knots[:, 1:]
+    at = obstacle.deepest(begins, ends)
+    values = obstacle.level((begins + at[:, :, None] * (ends - begins)).reshape(-1, 3))[0].reshape(at.shape)
+    rows, chords = np.arange(len(at)), values.argmin(axis=1)
+    behind, ahead = found.arcs[rows, chords], found.arcs[rows, chords + 1]
+    return np.asarray((behind + at[rows, chords] * (ahead - behind)) / found.lengths)
 
 
 def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:

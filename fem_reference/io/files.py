@@ -16,10 +16,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fem_reference.foundations.errors import NO_ROOM, InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary
 from fem_reference.foundations.subprocesses import lives
 from fem_reference.io import soup, xdmf
 from fem_reference.io.formats import Format, formats, vtk
+from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.soup import Lines
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
@@ -58,6 +59,32 @@ def read_surface(path: Path, unit: float) -> Surface:
     want = f"a triangle surface, whole, as {' '.join(formats())}"
     read = _format(path, want, formats()).read
     points, triangles = _attempt(lambda file: soup.arrays(read(file)), path, want)
+    return Surface(points * unit, triangles, str(path))
+
+
+def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
+    """The skin of those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (``gmsh:physical``
+    of gmsh); its coordinates are in units of ``unit`` mm. InputError where the file has no such array or none of the labels.
+    """
+    want = (
+        f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
+    )
+
+    def read(file: Path) -> tuple[Floats, Ints]:
+        from meshio import vtu
+
+        mesh = read_mesh(file) if file.suffix.lower() == ".msh" else vtu.read(file)
+        if array not in mesh.cell_data:
+            raise ValueError(f"arrays {', '.join(mesh.cell_data) or 'of none'}")
+        blocks = zip(mesh.cells, mesh.cell_data[array], strict=True)
+        found = [cells.data[np.isin(values, list(labels))] for cells, values in blocks if cells.type == "tetra"]
+        if not sum(map(len, found)):
+            raise ValueError("no such tetrahedra")
+        used, corners = np.unique(boundary(np.concatenate(found).astype(np.int64))[0], return_inverse=True)
+        return soup.arrays((np.asarray(mesh.points)[used], corners.reshape(-1, 3)))
+
+    _format(path, want, (".vtu", ".msh"))
+    points, triangles = _attempt(read, path, want)
     return Surface(points * unit, triangles, str(path))
 
 

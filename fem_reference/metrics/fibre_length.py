@@ -27,7 +27,7 @@ STATISTICS = {
     "rms_percent": _of_lines(
         *("%", _TITLE, "rms"),
         headline="lengths of fibres by {} rms",
-        shown={"main": 20, "headline": 20, "solvers": 30, "scenes": 20, "rank": 20, "claim": 50},
+        shown={"main": 20, "table": 25, "headline": 20, "solvers": 30, "scenes": 20, "rank": 20, "claim": 50},
     ),
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }

@@ -9,11 +9,12 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibre_templates import contours, mapped
-from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
+from fem_reference.geometry.fibres import Directions, NearestLine, Turned, fibre_field, trace
 from fem_reference.geometry.flux_fibres import area_flux, streamlines
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.geometry.signed_distance import signed_distances
@@ -47,6 +48,17 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
     path = case.file(outline.file, f"{key}.outline.file")
     patches = draped(_patches(path, outline, join(case.place, f"{key}.outline.clouds")), bone_surface)
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
+
+
+def unshifted(case: MuscleCase) -> MuscleCase:
+    """The case whose attachments are where their landmarks are: itself where no outline is shifted."""
+    still = tuple(
+        one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
+        if one.outline and one.outline.shift and one.outline.shift.by
+        else one
+        for one in case.attachment
+    )
+    return case if still == case.attachment else case.model_copy(update={"attachment": still})
 
 
 def tendon_of(case: MuscleCase, i: int) -> Floats | None:
@@ -107,14 +119,14 @@ def _quoted(text: str) -> str:
 
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
     """The patches spanned by the clouds of an outline, as one surface [mm]; ``place`` is the key of the clouds."""
-    clouds = _clouds(path, outline.unit)
-    patches = []
+    clouds, shift, patches = _clouds(path, outline.unit), outline.shift, []
+    moved = np.zeros(3) if shift is None else shift.by * np.array(shift.along) / np.linalg.norm(shift.along)
     for name in outline.clouds:
         if name not in clouds:
             raise InputError(place, f'"{name}", which {path} does not have', f"some of {', '.join(sorted(clouds))}")
         if len(clouds[name]) < 3:
             raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
-        patches.append(fan(np.array(clouds[name])))
+        patches.append(fan(np.array(clouds[name]) + moved))
     starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
     triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
     return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
@@ -174,7 +186,16 @@ TETS = 8000
 def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case in the closed ``surface`` of its muscle, and their direction at any point."""
     lines, directions = lines_of(case, surface, fill)
+    if case.fibres.turned is not None:
+        directions = Turned(directions, _turning(case))
     return (lines if case.fibres.traced else inside(surface, lines)), directions
+
+
+def _turning(case: MuscleCase) -> Floats:
+    """The matrix (3, 3) from the directions of the lines to those of the material."""
+    if (turned := case.fibres.turned) is None:
+        return np.eye(3)
+    return RigidMotion(turned.axis, (0.0, 0.0, 0.0), (0.0,), (turned.angle,)).pose(0.0)[:3, :3]
 
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
@@ -183,8 +204,7 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
-    volume = enclosed_volume(surface.points, surface.triangles)
-    mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
+    mesh = field_mesh(surface, fill)
     traced, ends = case.fibres.traced, case.fibres.ends.values()
     if traced is not None and traced.flux == "area":
         flux = area_flux(mesh, *ends)
@@ -199,14 +219,21 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
     return lines, NearestLine(lines)
 
 
+def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
+    """The tetrahedra in a closed ``surface`` for fields between attachments, by ``fill`` of a size [mm]."""
+    return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
+
+
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
-    it. It is the shear by their tension. 0 for fibres that are traced from one attachment to the other.
+    it. It is the shear by their tension. Those traced from one attachment to the other, or mapped, are taken to follow it.
     """
-    if (asked := case.fibres.kohout_kukacka) is not None:
-        return float(np.sin(2 * (asked.pennation or 0.0)))
+    turning = _turning(case)
     if (lines := _given(case)) is None:
-        return 0.0
+        asked, moved = case.fibres.kohout_kukacka, float(np.linalg.norm(turning @ axis - axis))
+        pennation = 0.0 if asked is None else asked.pennation or 0.0
+        return float(abs(np.sin(2 * pennation + 4 * np.arcsin(moved / 2))))
+    axis = turning.T @ axis
     pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)
     lengths, along = np.linalg.norm(pieces, axis=1), np.abs(pieces @ axis)
     cosine = along / np.maximum(lengths, np.finfo(float).tiny)

@@ -3,23 +3,26 @@
 Independent of any solver.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.regions import Region
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
+from fem_reference.problems.touching import Touching
 
+_OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fields are checked too
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, degree of the pressure (None: no such unknown; 0: constant in each cell).
 # Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
@@ -114,6 +117,14 @@ class Cells:
     degree: int
     facets: dict[str, Ints]
 
+    def places(self) -> Iterator[Floats]:
+        """Places (m, 3) [mm] in the cells at which fields are checked: their middles, and near each of their nodes."""
+        nodes = self.points[self.cells]
+        middles = nodes.mean(axis=1)
+        yield middles
+        for corner in np.swapaxes(nodes, 0, 1):
+            yield middles + _OUTWARDS * (corner - middles)
+
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
@@ -166,8 +177,9 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
-    ``contact``, if any, acts with every bone. ``interval`` [s]: the time between frame numbers, None where nothing depends on
-    time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, where the body does not start at rest.
+    ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
+    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at
+    ``frames[0]``, where the body does not start at rest; ``regions``: by name those in which effects act.
     """
 
     mesh: Cells
@@ -179,6 +191,8 @@ class Body:
     bones: tuple[ContactBone, ...] = ()
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
+    regions: Mapping[str, Region] = field(default_factory=dict)
+    touching: tuple[Touching, ...] = ()
 
     task: ClassVar[Task] = "solve_body"
     rest: ClassVar[AtRest] = NOTHING
@@ -193,6 +207,10 @@ class Body:
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
         return diagonal(self.mesh.points)
+
+    def shares(self, points: Floats) -> dict[str, Floats]:
+        """The shares (n,) of rest ``points`` (n, 3) [mm] in each region that an effect names."""
+        return {name: self.regions[name](points) for name in regions_named(self.effects)}
 
     def points_on(self, on: str | Skin) -> Floats:
         """The corners (n, 3) [mm] of the facets of a region, or the points of a skin, at rest."""

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, Load, in_situ
+from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
+from fem_reference.problems import regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -22,6 +23,7 @@ from fem_reference.problems.body import (
     reference_nodes,
 )
 from fem_reference.problems.contact import ContactBone, ContactLaw
+from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
 _UNIT = 1e-6  # the tolerance on the length of a unit vector
@@ -30,7 +32,6 @@ _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fibres are checked too
 _THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
 
 
@@ -49,11 +50,13 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
     _check_prescribed(body.prescribed)
     fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*fixed, *contact, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    loaded = [effect.on for effect in body.effects if isinstance(effect, Load)]
+    used = dict.fromkeys([*fixed, *contact, *loaded, *(on for law in body.touching for on in (law.one, law.other))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(map(str, body.mesh.facets))}")
     _check_regions(body.mesh, tuple(used))
+    check_touching(body.touching, body.mesh.cells, body.mesh.facets)
     _check_needs(body)
     check_agreement(body)
     _check_start(body)
@@ -122,6 +125,7 @@ def _check_rest(body: Body) -> None:
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
     _check_many("bones", body.bones, ContactBone, "bones that may press")
+    _check_many("touching", body.touching, Touching, "parts of the surface that may touch")
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
@@ -171,7 +175,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
-    names = [entry.name for entry in prescribed]
+    names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
@@ -218,9 +222,7 @@ def _check_needs(body: Body) -> None:
         return
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
-    nodes = body.mesh.points[body.mesh.cells]
-    middles = nodes.mean(axis=1)
-    for places in (middles, *(middles + _OUTWARDS * (corner - middles) for corner in np.swapaxes(nodes, 0, 1))):
+    for places in body.mesh.places():
         _check_unit(body.fibre, places)
 
 
@@ -240,13 +242,12 @@ def _check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where two regions prescribe different exact displacements at shared places, a path of motion cannot be
-    followed, or a tendon is beside tension at rest. Regions are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon is beside tension at rest, two
+    regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be followed. They
+    are compared at all frames, all stops, and the middles between them.
     """
-    if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
-        raise InputError(
-            "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
-        )
+    regions.check(body)
+    tendons.check(body)
     ends = np.unique([*body.frames, *body.stops])
     sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]

@@ -55,10 +55,7 @@ class ContactLaw:
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
-        k, d = self.stiffness, self.smoothing
-        near = np.where(gap > d, 0.0, d - gap)
-        pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
-        return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
+        return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
         """The gap (n,) [mm] of pressures (n,) [MPa] from 0 on."""
@@ -71,6 +68,13 @@ class ContactLaw:
             return float(self.in_situ is not None)
         first, last = self.relaxed
         return float(np.clip((last - frame) / (last - first), 0, 1))
+
+
+def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:
+    """The pressure (n,) [MPa] at gaps (n,) [mm] for a stiffness ``k`` [MPa/mm] and a smoothing ``d`` [mm], and its slope."""
+    near = np.where(gap > d, 0.0, d - gap)
+    pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
+    return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, Interaction, Ramped, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Interaction, Ramped, State, elastic_state, regions_named, total_energy
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
+from fem_reference.geometry.regions import samples
 from fem_reference.problems.anatomy import lean
 from fem_reference.problems.guess import (
     Guess,
@@ -128,7 +129,7 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
     moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
     travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
     speed, sideways, jump, acceleration = motion(guess, axis_of(rest), case.numbers)
-    size, shear = case.muscle.tet_size / 2**case.muscle.refinements, _shear(case)
+    size, shear = case.muscle.tet_size / 2**case.muscle.refinements, _shear(case, rest)
     most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
     (low, high), taut = _stretch(rest, frames), _taut(case)
     return Estimates(
@@ -160,19 +161,23 @@ def _instants(case: MuscleCase) -> tuple[float, ...]:
     return tuple(sorted({*map(float, case.numbers), *(knot for knot in knots if first <= knot <= last)}))
 
 
-def _shear(case: MuscleCase) -> float:
-    """The shear modulus at rest [MPa] of the stored energies, without fibres."""
+def _shear(case: MuscleCase, rest: Setup) -> float:
+    """The shear modulus at rest [MPa] of the stored energies, without fibres; where regions differ, that of the softest place."""
     stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
     laws = [(one, 1.0) for one in stored]
     isotropic = [(one, 1.0) for one in stored if not one.needs]
     small = 1e-3
     sheared = State(F=((1.0, small, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), pressure=0.0, fibre=(0.0, 0.0, 1.0))
-    return 2 * float(total_energy(isotropic or laws, sheared)) / small**2 or np.finfo(float).tiny
+    named = regions_named(one for one, _ in isotropic or laws)
+    points = samples(rest.surface) if named else np.zeros((0, 3))
+    at = replace(sheared, regions={name: rest.regions[name](points) for name in named})
+    return 2 * float(np.min(total_energy(isotropic or laws, at))) / small**2 or np.finfo(float).tiny
 
 
 def _tension(case: MuscleCase) -> float:
-    """The stress of all fibres at their rest length [MPa], the mean over the frames."""
+    """The stress of all fibres at their rest length [MPa], the mean over the frames, without those of regions."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
+    pulling = [one for one in pulling if not one.region]
     return sum(
         float(np.mean([one.amount(frame) for frame in case.numbers])) * fibre_tension(one.energy, 1.0)
         for one in pulling

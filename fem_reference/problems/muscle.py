@@ -41,7 +41,8 @@ from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
-from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of
+from fem_reference.problems import regions
+from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
@@ -59,8 +60,7 @@ from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_o
 from fem_reference.problems.tendons import pulling
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
-# Frame numbers before the first over which an overlap at rest is removed.
-RELAXING = 10
+RELAXING = 10  # frame numbers before the first over which an overlap at rest is removed
 
 
 def kept_meshes() -> Path | None:
@@ -118,7 +118,7 @@ class MuscleProblem(Setup):
             name, path = entry.attachment, Follows(From(first, entry.bone.pose))
             prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
         acting = tuple(effect for effect in self.effects if not isinstance(effect, Interaction))
-        body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre)
+        body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre, regions=self.regions)
         body = replace(body, interval=self.interval, start=self.start)
         if self.contact is not None:
             assert self.skin is not None  # built with the effect
@@ -150,7 +150,8 @@ def setup(case: MuscleCase) -> Setup:
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
     bones = tuple(_body(case, i, surface) for i in range(len(case.bone)))
     attached, joints = _attached(case, surface, bones), joints_of(case, bones)
-    return Setup(surface, bones, attached, case.frames.numbers, case.frames.interval, joints=joints)
+    rest = Setup(surface, bones, attached, case.frames.numbers, case.frames.interval, joints=joints)
+    return replace(rest, regions=regions.of_case(case, rest, partial(filled, case, rest)))
 
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
@@ -165,14 +166,14 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         if len(mesh.facets[attached.attachment]) == 0:
             place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, rest))
-    ends = attached_ends(rest.attached, rest.exempt, fibres)
+    own = rest if (plain := unshifted(case)) is case else setup(plain)
+    fibres, fibre = fibres_of(case, rest.surface, partial(filled, case, own))
+    ends = attached_ends(own.attached, own.exempt, fibres)
     if case.fibres.complete and ends is not None:
         fibres = inside(rest.surface, completed(fibres, ends))
-        ends = attached_ends(rest.attached, rest.exempt, fibres)
-    asked = (*case.effects, *(one.effect for one in case.decisions))
-    needed = fibre if any("fibre" in effect.needs for effect in asked) else None
-    problem = assembled(rest, mesh, case.effects, (fibres, needed), spacing(rest.surface))
+        ends = attached_ends(own.attached, own.exempt, fibres)
+    asked = any("fibre" in effect.needs for effect in (*case.effects, *(one.effect for one in case.decisions)))
+    problem = assembled(rest, mesh, case.effects, (fibres, fibre if asked else None), spacing(rest.surface))
     facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known | ({} if ends is None else ends.facts)
     return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
@@ -212,9 +213,8 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
-    blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
-    mesh = block.fill(rest.surface, size) if blocks else filled(rest.surface, size)
+    mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
     if set(mesh.facets) == set(shares):
         return mesh
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
@@ -222,11 +222,11 @@ def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
 
 def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
     bone = case.bone[i]
-    motion = bone.motion.poses() if bone.motion else None
     if bone.surface is None or bone.unit is None:
         return closed_form(bone, muscle, join(case.place, f"bone[{i}]"))
     surface = files.read_surface(case.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
+    motion = bone.motion.poses() if bone.motion else None
     return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
@@ -294,6 +294,5 @@ def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: Contac
     before = first - RELAXING if nearest < effect.smoothing and not tense else None
     relaxed, support = None if before is None else (before, first), effect.support or 0.0 if tense else None
     law = ContactLaw(skin, effect.stiffness, effect.smoothing, relaxed, support)
-    frames = body.frames if before is None else (before, *body.frames)
     posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
-    return replace(body, frames=frames, contact=law, bones=posed)
+    return replace(body, frames=(*(relaxed or (first,)), *body.frames[1:]), contact=law, bones=posed)

@@ -10,7 +10,7 @@ from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.problems import muscle, scalar
+from fem_reference.problems import muscle, regions, scalar
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
 from fem_reference.problems.muscle import MuscleProblem
@@ -76,6 +76,7 @@ def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
             effect.title: {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
             for effect in case.effects
         },
+        **({"regions": regions.facts(setup)} if setup.regions else {}),
         **({"effects_chosen": [str(one) for one in case.decisions]} if case.decisions else {}),
         "frames": f"{frames.first} to {frames.last}, every {frames.every}",
     }
@@ -104,13 +105,14 @@ def _motion(motion: RigidMotion | None) -> str:
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """The effect of the bones' motion on a muscle, and why it needs its effects, in words; empty for a scalar field."""
+    """The effect of the bones' motion on a muscle, its regions, and why it needs its effects, in words; nothing of a field."""
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)
     effects = {one.effect.title: str(one).partition(": ")[2] for one in found}
     motion = described_motion(setup)
-    return ({"motion": motion} if motion else {}) | {"effects": effects}
+    parts = {"regions": regions.facts(setup)} if setup.regions else {}
+    return ({"motion": motion} if motion else {}) | parts | {"effects": effects}
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:

@@ -1,6 +1,6 @@
 """Muscles before they are meshed: the surface, its bones, its attachments, its joints, and the requested frames."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.exemption import Exemption
+from fem_reference.geometry.regions import Region
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.signed_distance import cached
@@ -97,7 +98,8 @@ class AttachedVertices:
 class Setup:
     """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
     frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the
-    first frame, by its rest positions (n, 3), where that is not at rest; ``joints``, about whose axes bones turn.
+    first frame, by its rest positions (n, 3), where that is not at rest; ``joints``, about whose axes bones turn; ``regions``, by
+    name those in which effects act.
     """
 
     surface: Surface
@@ -107,6 +109,7 @@ class Setup:
     interval: float | None
     start: Callable[[Floats], Floats] | None = field(default=None, kw_only=True)
     joints: tuple[Joint, ...] = field(default=(), kw_only=True)
+    regions: Mapping[str, Region] = field(default_factory=dict, kw_only=True)
 
     task: ClassVar[Task] = "solve"
     exact: ClassVar[None] = None  # no solution of a muscle is known as a formula

@@ -3,7 +3,7 @@
 All lengths in mm. A region lists the corners of its facets in the order of their lattice: of a quadrilateral, 0 and 3 are opposite.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
 
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, connected_parts
 from fem_reference.problems.body import Cells, Kind, facet_corners, reference_nodes
 from fem_reference.problems.checks import check_box
@@ -110,6 +111,19 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
     """
     check_box(counts, size, kind, degree)
     return mapped([Brick(lambda unit: unit * size, counts, _SIX)], kind, degree)
+
+
+def joined(pieces: Mapping[str, Cells]) -> Cells:
+    """The mesh of separate ``pieces``, all of one kind and degree. A region is named after its piece and its region there, as in
+    ``left_x1``.
+    """
+    meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
+    if len(kinds) != 1:
+        raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
+    starts = dict(zip(pieces, np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), strict=False))
+    named = {f"{name}_{on}": starts[name] + f for name, mesh in pieces.items() for on, f in mesh.facets.items()}
+    cells = np.concatenate([starts[name] + mesh.cells for name, mesh in pieces.items()])
+    return Cells(np.concatenate([mesh.points for mesh in meshes]), cells, *kinds.pop(), named)
 
 
 def warped_box(

@@ -1,8 +1,9 @@
 """Stresses in solved states by the energies of effects, independently of any solver; and those of effects left out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from fem_reference.effects.contact import among
 from fem_reference.foundations.indicators import Estimates
 from fem_reference.foundations.jets import JET_FUNCTIONS, Jet, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
+from fem_reference.geometry.regions import Region
 from fem_reference.problems.estimates import ROUNDING, STRESS_TOLERANCE, Decision, decision, solved
 from fem_reference.problems.guess import axis_of, rms
 from fem_reference.problems.problem import Problem
@@ -18,6 +20,8 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 Acting = Sequence[tuple[Effect, float]]
+Shares = Mapping[str, Floats]
+NONE: Shares = MappingProxyType({})
 
 # The tetrahedra that are sampled, evenly spread, and the places evaluated at once, so that their jets fit in a cache.
 _MOST, AT_ONCE = 2048, 1024
@@ -33,9 +37,9 @@ def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float =
     return np.asarray(np.broadcast_to(slope.reshape(9, -1), (9, count)).T.reshape(count, 3, 3))
 
 
-def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
+def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = NONE) -> Floats:
     """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of what is ``acting`` at deformation gradients ``F`` (n, 3, 3) with
-    fibres along ``fibre`` (n, 3), without the pressure of the mixed form and without effects of time.
+    fibres along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects of time.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
@@ -43,6 +47,7 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
         jets = variables(F[some].reshape(-1, 9).T, curved=False)
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JET_FUNCTIONS)
+        state = replace(state, regions={name: share[some] for name, share in shares.items()})
         with np.errstate(all="ignore"):  # what is no number is needed
             found[some] = first_piola(acting, state, len(F[some])) @ np.swapaxes(F[some], 1, 2)
     return found
@@ -61,14 +66,20 @@ class StressSizes:
 
 
 class StressSamples:
-    """Tetrahedra of a ``mesh``, with the unit vectors ``fibre`` (m, 3) along their fibres: stresses of states of their points."""
+    """Tetrahedra of a ``mesh``, with the unit vectors ``fibre`` (m, 3) along their fibres and the ``regions`` in which effects act:
+    stresses of states of their points.
+    """
 
-    def __init__(self, mesh: TetMesh, fibre: Floats | None) -> None:
+    def __init__(
+        self, mesh: TetMesh, fibre: Floats | None, regions: Mapping[str, Region] = MappingProxyType({})
+    ) -> None:
         chosen = np.unique(np.linspace(0, len(mesh.tets) - 1, _MOST).astype(int))
         self.tets: Ints = mesh.tets[chosen]
         self.inverse = np.linalg.inv(edge_vectors(mesh.points[self.tets]))
         self.volumes = tet_volumes(mesh.points, self.tets)
         self.fibre = None if fibre is None else fibre[chosen]
+        middles = mesh.points[self.tets].mean(axis=1)
+        self.shares = {name: region(middles) for name, region in regions.items()}
 
     def sizes(self, positions: Floats, acting: Acting, others: Acting) -> StressSizes:
         """The sizes for what is ``acting``, and for each of the ``others`` on top, where the points are at ``positions`` (n, 3)."""
@@ -77,8 +88,9 @@ class StressSamples:
         if not good.any():
             return StressSizes(np.nan, (np.nan,) * len(others), (np.nan, np.nan))
         F, volumes, fibre = F[good], self.volumes[good], None if self.fibre is None else self.fibre[good]
-        now = kirchhoff(acting, F, fibre)
-        added = [_added(acting, one, now, lambda terms: kirchhoff(terms, F, fibre)) for one in others]
+        shares = {name: share[good] for name, share in self.shares.items()}
+        now = kirchhoff(acting, F, fibre, shares)
+        added = [_added(acting, one, now, lambda terms: kirchhoff(terms, F, fibre, shares)) for one in others]
         shear = now - np.trace(now, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
         return StressSizes(
             _mean(shear, volumes), tuple(_mean(one, volumes) for one in added), _stretches(acting, F, fibre, volumes)
@@ -126,7 +138,7 @@ class Watch:
         """The sampled tetrahedra."""
         rest = self.built().rest
         assert rest.mesh is not None  # of a muscle that is filled
-        return StressSamples(rest.mesh, rest.directions)
+        return StressSamples(rest.mesh, rest.directions, self.rest.regions)
 
     @property
     def names(self) -> list[str]:

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, in_situ
 from fem_reference.effects.tendon import Tendon
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, TetMesh
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin, spacing
-from fem_reference.problems.body import Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.fibre_ends import attached_ends, ends_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.setup import Setup
@@ -20,6 +20,14 @@ from fem_reference.problems.setup import Setup
 def force_name(attachment: str) -> str:
     """The name under which the force of the tendons of an ``attachment`` is reported."""
     return f"{attachment}_tendon"
+
+
+def check(body: Body) -> None:
+    """Raise InputError where a tendon is beside tension at rest."""
+    if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
+        raise InputError(
+            "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
+        )
 
 
 def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect, ...]) -> Iterator[Prescribed]:

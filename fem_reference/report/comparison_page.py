@@ -4,12 +4,13 @@ import math
 from collections import Counter
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fem_reference.assessment import experiments, second_check
 from fem_reference.assessment.comparison import Comparison, reached, reached_frames
+from fem_reference.assessment.credibility import claims
 from fem_reference.assessment.differences import greatest
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.foundations.limits import ENERGY_GAP
@@ -66,7 +67,9 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "bars": known(comparison),
         "spread": spread(comparison),
         "error": error and error.worst,
-        "model_band": experiments.model_band() if comparison.error_bars and comparison.scene.task == "solve" else (),
+        "model_bands": [
+            (one, experiments.model_band(one.band)) for one in claims() if comparison.scene.task == "solve"
+        ],
         "viewer": view(comparison),
         "pictures": gallery.of_comparison,
         "label": partial(label, comparison.scene, comparison.setup),
@@ -74,7 +77,7 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
         "changes": origin.changes(comparison.scene),
         "energy_gap_limit": ENERGY_GAP,
         "second_check": second_check.texts_of,
-        **by_name(curves, label_of, seconds_per_frame, inversion, greatest, widest, gap),
+        **by_name(curves, label_of, seconds_per_frame, inversion, greatest, widest, gap, first_rows, first_columns),
         **cost.facts(comparison),
         **origin.facts(comparison),
     }
@@ -101,10 +104,50 @@ def headlines(comparison: Comparison) -> Headlines:
     for run in comparison.candidates:
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
         found.append((run.name, comparison.word_of(run.name), ended + _greatest(comparison, run)))
-    words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
-    checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    found.append(("reference", comparison.word_of("reference"), "; ".join([checks, *comparison.doubts])))
+    found.append(("reference", comparison.word_of("reference"), "; ".join([_checks(comparison), *comparison.doubts])))
     return tuple(found)
+
+
+def _checks(comparison: Comparison) -> str:
+    """The number of expectations of the reference that are met, in words."""
+    words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
+    return f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
+
+
+class VerdictRow(NamedTuple):
+    """A row of the table at the top: a ``run`` with its verdict, its headline measures, None where it has none, and remarks."""
+
+    run: Run
+    word: str
+    measures: tuple[Measure | None, ...]
+    remarks: tuple[str, ...]
+
+
+def first_rows(comparison: Comparison) -> list[VerdictRow]:
+    """The rows of the table at the top, the reference last; its doubts are stated beside its verdict."""
+    rows = list[VerdictRow]()
+    for run in comparison.candidates:
+        found = comparison.deviations.get(run.name, ())
+        remarks = () if run.outcome.status == "converged" else (f"{run.outcome.status}: {run.outcome.message}",)
+        measures = tuple(find(found, *key) for key in _headline_keys(comparison))
+        rows.append(VerdictRow(run, comparison.word_of(run.name), measures, remarks))
+    nothing = (None,) * len(_headline_keys(comparison))
+    word = comparison.word_of("reference")
+    before = "doubtful: " if word == "doubtful pass" else ""
+    why = (_checks(comparison), *(f"{before}{one}" for one in comparison.doubts))
+    return [*rows, VerdictRow(comparison.reference, word, nothing, why)]
+
+
+def _headline_keys(comparison: Comparison) -> list[tuple[str, str]]:
+    """The metric and statistic of each column of that table: those that a candidate has."""
+    every = [one for run in comparison.candidates for one in comparison.deviations.get(run.name, ())]
+    return [key for key in described("headline") if find(every, *key) is not None]
+
+
+def first_columns(comparison: Comparison) -> list[str]:
+    """The heads of its columns of numbers."""
+    named = described("headline")
+    return [f"{named[key].title}, {named[key].part}".strip(", ") for key in _headline_keys(comparison)]
 
 
 def _greatest(comparison: Comparison, run: Run) -> str:

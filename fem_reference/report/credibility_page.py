@@ -18,8 +18,8 @@ from fem_reference.report.pages import Page
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
     "indicative": "within what single specimens, quotations or memory say",
-    "outside": "outside of a measurement by more than its uncertainty",
-    "verified only": "no experiment is laid beside it",
+    "outside": "the model differs from a measurement of muscle by more than the uncertainty of that",
+    "verified only": "the equations are solved right; no measurement of muscle is laid beside it",
     "not measured": "the data of its experiment is not here",
 }
 
@@ -28,7 +28,7 @@ def page(found: Credibility) -> Page:
     """The page of the evidence for each quantity."""
     contents = {
         "found": found,
-        "grades": GRADES,
+        "by_grade": by_grade(found),
         "met": {
             (fit.law, one.name): met(fit.values, one) for fit in found.fits for row in found.rows for one in row.beside
         },
@@ -36,6 +36,12 @@ def page(found: Credibility) -> Page:
         "drawings": [_drawing(one) for one in found.arms],
     }
     return Page("credibility", "Credibility", (("", "", said(found)),), "credibility_page.html", contents, facts(found))
+
+
+def by_grade(found: Credibility) -> list[tuple[str, list[str], str]]:
+    """Each grade that occurs with its quantities and its meaning; the first, validated, also where it has none."""
+    names = {grade: [row.claim.name for row in found.rows if row.grade == grade] for grade in GRADES}
+    return [(grade, names[grade], meaning) for grade, meaning in GRADES.items() if names[grade] or grade == "validated"]
 
 
 def said(found: Credibility) -> str:

@@ -116,11 +116,14 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last."""
+    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last; beyond three rows
+    the figure grows with them.
+    """
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]
     columns = len(labels) if sum(lengths) < 75 else max(1, 75 // max(lengths))
+    figure.set_figheight(figure.get_figheight() + 0.19 * max(0, -(-len(labels) // columns) - 3))
     figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
 
 

@@ -8,11 +8,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from fem_reference.assessment import ranking
+from fem_reference.assessment.fronts import LOAD, LOADED
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.io.texts import finite
 from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page
+from fem_reference.report.words import under_load
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
@@ -28,10 +30,17 @@ def page(table: Table) -> Page:
         "columns": COLUMNS,
         "over_all": OVER_ALL,
         "report_speeds": report_speeds(),
+        "load": _load(table),
         "drawing": _drawing(table),
     }
     said = f"{len(table.results)} results on {len(table.scenarios)} scenes"
     return Page("ranking", "Table 5.1 in numbers", (("", "", said),), "ranking_page.html", contents, facts(table))
+
+
+def _load(table: Table) -> str:
+    """A warning where solvers were timed on a machine that was busy with other work, else empty."""
+    timed = (one.outcome.cost for one in table.results if one.seconds_per_frame)
+    return under_load((cost.get(LOAD, math.nan) for cost in timed), LOADED)
 
 
 def facts(table: Table) -> dict[str, Any]:
@@ -66,6 +75,7 @@ def text(table: Table) -> str:
             text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
         known = " (its error bar)" if one.of_reference and one.measures else ""
         lines.append(f"{one.case}: {one.kind}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
+    lines += [warning] if (warning := _load(table)) else []
     return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])
 
 

@@ -1,13 +1,18 @@
 """A recommended setting in words: as text and as JSON."""
 
+import math
+from collections.abc import Iterable
+
+from fem_reference.assessment.answers import Answer
+from fem_reference.assessment.fronts import LOADED
 from fem_reference.assessment.recommendation import Expected, Recommendation
-from fem_reference.report.study_page import title_of
-from fem_reference.report.words import duration, listed, number
+from fem_reference.report.words import duration, listed, number, title_of, under_load
 
 
 def facts(found: Recommendation, metric: str) -> dict[str, object]:
     """A recommendation as valid JSON."""
     best, near = found.best, found.nearest
+    one = best or near
     return {
         "metric": metric,
         "recommended": best and best.point.choice,
@@ -20,6 +25,8 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
         "measured_on": list(found.of),
         "margin_error": found.margins.error,
         "margin_time": found.margins.time,
+        "load_by_others": None if one is None or math.isnan(one.point.load) else one.point.load,
+        "timed_under_load": sum(load > LOADED for load in found.loads),
     }
 
 
@@ -40,7 +47,52 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
     if not found.measured:
         margins = found.margins
         lines.append(f"margins in it: {number(margins.error)} times the error, {number(margins.time)} times the time")
+    if warning := under_load(found.loads, LOADED):
+        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""
+        lines.append(f"{warning}{own}")
     return "\n".join(lines)
+
+
+def answer_texts(found: Iterable[Answer], unit: str) -> list[str]:
+    """The answers in a sentence each: the request, the setting, its error in a ``unit`` with the bar of the truth, and its time."""
+    return [f"{asked_for(one, unit)}: {_answer(one, unit)}" for one in found]
+
+
+def answer_facts(found: Iterable[Answer]) -> list[dict[str, object]]:
+    """The answers as valid JSON."""
+    return [
+        {
+            "limits": dict(one.limits),
+            "recommended": one.best and one.best.point.choice,
+            "error": one.best and one.best.error,
+            "seconds_per_frame": one.best and one.best.time,
+        }
+        for one in found
+    ]
+
+
+def asked_for(one: Answer, unit: str) -> str:
+    """The request of an answer in words."""
+    if "error" in one.limits:
+        return f"Within {number(one.limits['error'])} {unit}"
+    return (
+        f"At {number(1 / one.limits['time'])} frames a second" if "time" in one.limits else "At the knee of the front"
+    )
+
+
+def setting_text(one: Expected, unit: str) -> str:
+    """A setting with its error and its time."""
+    label = one.point.label
+    named = label if label.startswith(one.point.solver) else f"{one.point.solver} ({label})"
+    return f"{named}, {number(one.error)} {unit}, {duration(one.time)} a frame"
+
+
+def _answer(one: Answer, unit: str) -> str:
+    if one.best is not None:
+        return setting_text(one.best, unit)
+    if one.nearest is None:
+        return "no setting; more points are needed"
+    return f"no setting; the nearest is {setting_text(one.nearest, unit)}"
 
 
 def _parts(one: Expected, unit: str, *, measured: bool) -> str:

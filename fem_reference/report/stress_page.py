@@ -11,7 +11,9 @@ from fem_reference.foundations.mesh import normals
 from fem_reference.report.drawings import webp
 from fem_reference.report.pages import Page
 
-_MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "refused": "\N{EN DASH}", "inconclusive": "?"}
+_MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "inconclusive": "?"}
+_MARKS |= {"not applicable": "\N{EN DASH}", "no solution": "∅"}
+_NOTHING_TO_SAY = ("ok", "not applicable", "no solution")
 _SIDE, _OVERSAMPLING = 220, 2
 # The camera looks along this direction, from in front, above and to the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
@@ -41,7 +43,7 @@ def text(found: Stress) -> str:
     for case in found.cases:
         cells = [found.at(case.name, solver) for solver in found.solvers]
         lines.append(f"{case.name:{width}}  " + "  ".join(f"{cell.solver} {cell.verdict}" for cell in cells))
-        lines += [f"  {cell.solver}: {cell.sentence}" for cell in cells if cell.verdict not in ("ok", "refused")]
+        lines += [f"  {cell.solver}: {cell.sentence}" for cell in cells if cell.verdict not in _NOTHING_TO_SAY]
     return "\n".join(lines)
 
 

@@ -1,7 +1,7 @@
 """The page of a study: error against cost, the best solver at the same cost or error, the cost of half the error."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,16 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment import cost_study, fronts
+from fem_reference.assessment.answers import Answer, answers
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import COSTS, Match, Point, Price, levels, match, solvers
-from fem_reference.assessment.recommendation import transfers
+from fem_reference.assessment.fronts import COSTS, LOADED, Match, Point, Price, levels, match, solvers
+from fem_reference.assessment.recommendation import known_settings, transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, logarithmic
 from fem_reference.report.pages import Page, by_name
-from fem_reference.report.words import duration, listed, number
+from fem_reference.report.recommendation_texts import answer_texts, asked_for
+from fem_reference.report.words import duration, listed, number, under_load
 from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
@@ -41,10 +43,27 @@ def page(study: Study) -> Page:
         "claims": lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         "transfers": moved,
         "losses": sorted(one.loss for one in moved),
-        **by_name(shown, solvers, front, sentences, matched, left_out, title_of, as_measured),
+        **by_name(
+            shown,
+            solvers,
+            front,
+            sentences,
+            matched,
+            left_out,
+            title_of,
+            as_measured,
+            load_of,
+            answered,
+            answer_texts,
+            asked_for,
+        ),
     }
     one = cases[0] if len(cases) == 1 else None
-    said = tuple(("" if one else case.case, "", text) for case in study.cases for text in sentences(case)[-1:])
+    said = tuple(
+        ("" if one else case.case, "", text)
+        for case in study.cases
+        for text in answer_texts(answered(case), case.units[MAIN])
+    )
     title = "What accuracy costs" + (f": {study.cases[0].title}" if one else "")
     return Page("study", title, said, "study_page.html", contents, one or cases)
 
@@ -105,6 +124,17 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
     ]
 
 
+def answered(case: CaseStudy) -> tuple[Answer, ...]:
+    """The answers to what is asked first, by the settings that the verb recommend takes; none of a case without settings."""
+    known = known_settings(case.features, case.case, [case], MAIN).settings
+    return answers(known) if known else ()
+
+
+def load_of(points: Iterable[Point]) -> str:
+    """A warning where times of ``points`` were measured on a machine that was busy with other work, else empty."""
+    return under_load((point.load for point in points if point.status == "converged"), LOADED)
+
+
 def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
     """The measured error of a point of a table, without the bar of the truth; None for the truth itself."""
     return None if point.is_truth else point.errors[error] - case.bars.get(error, 0.0)
@@ -120,6 +150,8 @@ def front(case: CaseStudy, error: str) -> Drawing:
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
+        if error == MAIN:
+            _draw_answers(axes, answered(case))
         for i, solver in enumerate(solvers(case.points)):
             pairs = [pair for pair in shown_points(case) if pair[0].solver == solver]
             _draw(axes, pairs, error, solver, colour_of(i))
@@ -132,6 +164,18 @@ def front(case: CaseStudy, error: str) -> Drawing:
             figure.legend(loc="outside lower center", ncols=3, fontsize="small")
 
     return drawn(f"front-{case.case}-{error.replace('.', '-')}", title, (4.9, 4.2), draw)
+
+
+def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
+    """The limits of requests as lines, and the best setting of each as a numbered diamond."""
+    for i, one in enumerate(found):
+        for limit, line in ((one.limits.get("error"), axes.axhline), (one.limits.get("time"), axes.axvline)):
+            if limit is not None:
+                line(limit, color="#888888", linestyle=":", linewidth=1)
+        if one.best is not None:
+            place = one.best.time, one.best.counted
+            axes.plot(*place, "D", color="#1d1d1f", markersize=7, fillstyle="none")
+            axes.annotate(str(i + 1), place, (5, 5 - 9 * (i % 2)), textcoords="offset points", color="#1d1d1f")
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
@@ -181,10 +225,12 @@ def text(study: Study) -> str:
     for case in study.cases:
         there = sum(point.status == "converged" for point in case.points)
         lines.append(f"{case.case}: {there} points of {listed(list(solvers(case.points)))}; the truth is {case.truth}")
+        lines += [f"  {sentence}" for sentence in answer_texts(answered(case), case.units[MAIN])]
         for error in shown(case):
             known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
             lines.append(f"  {title_of(error)}{known}:")
             lines += [f"    {sentence}" for sentence in sentences(case, error)]
+        lines += [f"  {warning}" for warning in [load_of(case.points)] if warning]
         lines += [f"  left out: {one.solver}, {one.label}: {one.status}: {one.message}" for one in left_out(case)]
     lines += [f"left out: {case}: {why}" for case, why in study.missing.items()]
     return "\n".join(lines)

@@ -46,9 +46,9 @@ def sentences(found: Uncertainty) -> list[str]:
         one.candidate: one.word for one in found.placed if found.bands and one.quantity == found.bands[0].quantity
     }
     for word, text in (
-        ("inside", "Candidates whose surface errs less than what nobody knows: {}."),
+        ("inside", "Candidates whose surface errs less than the unknown parameters move it: {}."),
         ("undecided", "Candidates too near to the edge of the band to say, with the error bar of the reference: {}."),
-        ("outside", "Candidates whose surface errs more than what nobody knows: {}."),
+        ("outside", "Candidates whose surface errs more than the unknown parameters move it: {}."),
     ):
         named = [name for name, one in places.items() if one == word]
         said += [text.format(listed(named))] if named else []
@@ -103,7 +103,7 @@ def drawing(found: Uncertainty, band: Band) -> Drawing:
 def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
     frames, bar = np.asarray(band.numbers, float), np.zeros(len(band.numbers)) if band.bar is None else band.bar
     low, high = (np.zeros(len(frames)) if band.distance else band.low - band.nominal), band.high - band.nominal
-    label = "95 % of the runs below" if band.distance else "5 to 95 % of the runs"
+    label = "95 % below" if band.distance else "5 to 95 %"
     axes.fill_between(frames, low, high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
     axes.plot(frames, band.median - band.nominal, color=_SHADE, linewidth=1.2, label="median")
     if band.bar is not None:
@@ -132,6 +132,7 @@ def shares(found: Uncertainty, band: Band) -> Drawing:
         axes.set_yticks(places, [titles[key] for key in keys])
         axes.set(xlabel="% of the variance over all frames", xlim=(0, 105))
         axes.grid(visible=False, axis="y")
+        axes.set_axisbelow(True)
         axes.figure.legend(loc="outside upper left", ncols=2)
 
     return drawn(f"shares-{band.quantity}", title, (5.4, 1.1 + 0.34 * len(keys)), draw)

@@ -1,6 +1,7 @@
 """Numbers and names as people read them: three significant digits, a true minus sign, powers of ten, plain words."""
 
 import math
+from collections.abc import Iterable
 
 _MINUS, _TIMES, _DASH, _THIN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}", "\N{NARROW NO-BREAK SPACE}"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -39,6 +40,24 @@ def duration(seconds: float | None) -> str:
     if seconds >= 600:
         return f"{number(seconds / 60)} min"
     return f"{number(seconds)} s" if seconds >= 1 or not seconds > 0 else f"{number(seconds * 1000)} ms"
+
+
+def under_load(shares: Iterable[float], most: float) -> str:
+    """A warning where times were measured on a machine of which other processes kept a share of more than ``most`` busy; NaN is a
+    share that is not known.
+
+    >>> under_load([0.02, 0.5, 0.25], 0.1)
+    '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'
+    >>> under_load([0.02, float("nan")], 0.1)
+    ''
+    """
+    every = list(shares)
+    loaded = sorted(share for share in every if share > most)
+    if not loaded:
+        return ""
+    span = " to ".join(dict.fromkeys(f"{100 * share:.0f} %" for share in (loaded[0], loaded[-1])))
+    count = f"{len(loaded)} of {len(every)} times were" if len(every) > 1 else "the time was"
+    return f"{count} measured while other processes kept {span} of the machine busy: undisturbed runs take less time"
 
 
 def ratio(one: float | None, other: float | None) -> float | None:

@@ -5,7 +5,7 @@ functions of the element, the stress from the energies of the effects, different
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import roots_jacobi
 
-from fem_reference.effects import Effect, Energy, State, elastic_state, in_situ
+from fem_reference.effects import Effect, Energy, State, elastic_state, in_situ, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.material_point import NUMPY, Functions
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
 from fem_reference.geometry.embedding import Locator
+from fem_reference.geometry.regions import INWARDS, Region
 from fem_reference.problems.body import reference_nodes
+from fem_reference.problems.muscle import setup
 from fem_reference.problems.stresses import AT_ONCE, first_piola
 from fem_reference.runs import states, store
 from fem_reference.runs.states import NodalState
@@ -45,13 +47,14 @@ ROUNDING = 1e-9
 class Results:
     """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3): the unit vector
     along the fibres at the middle of each tet, where known. The solution has one at every quadrature point: in a bar of 6 mm tets
-    the two differ by 2 degrees, root mean square.
+    the two differ by 2 degrees, root mean square. ``regions``: by name those in which effects act.
     """
 
     mesh: TetMesh
     effects: tuple[Effect, ...]
     states: Mapping[float, NodalState]
     fibre: Floats | None = None
+    regions: Mapping[str, Region] = field(default_factory=dict)
 
     @property
     def frames(self) -> tuple[float, ...]:
@@ -155,7 +158,8 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
     scene = read_muscle(case) if isinstance(case, str | Path) else muscle(case)
     if run.origin.get("scene") != scene.key:
         raise InputError(folder, f"a run of another scene than {scene.place}", "the scene that was solved")
-    return Results(mesh, scene.effects, states.StoredStates(folder, run.numbers), fibre)
+    regions = setup(scene).regions if scene.region else {}
+    return Results(mesh, scene.effects, states.StoredStates(folder, run.numbers), fibre, regions)
 
 
 class _Places:
@@ -163,7 +167,9 @@ class _Places:
 
     def __init__(self, results: Results, state: NodalState, tets: Ints, barycentric: Floats) -> None:
         self.results, self.state, self.tets, self.corners = results, state, tets, barycentric
-        inverse = np.linalg.inv(edge_vectors(results.mesh.points[results.mesh.tets[tets]]))
+        corners = results.mesh.points[results.mesh.tets[tets]]
+        self.places = np.einsum("na,nai->ni", barycentric + INWARDS * (1 / 4 - barycentric), corners)  # at rest
+        inverse = np.linalg.inv(edge_vectors(corners))
         gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
         self.functions, self.slopes = lagrange(barycentric, gradients, state.displacement.shape[1])
         self.displacement, self.F = self._moved(state.displacement)
@@ -220,7 +226,7 @@ class _Places:
             now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
             for effect, amount in acting:
                 if isinstance(effect, Energy):
-                    yield type(effect).__module__.rpartition(".")[2], effect.energy(replace(now, amount=amount))
+                    yield type(effect).__module__.rpartition(".")[2], effect.weighted(replace(now, amount=amount))
             if len(self.state.response):
                 whole = self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY)
                 yield "in_situ", self._at_rest(whole)
@@ -250,6 +256,7 @@ class _Places:
             before=list(before.T),
             F_before=[list(row) for row in np.moveaxis(F_before, 0, -1)],
             rate=state.rate,
+            regions={name: self.results.regions[name](self.places) for name in regions_named(self.results.effects)},
             functions=functions,
         )
 

@@ -22,6 +22,7 @@ from fem_reference.foundations.records import FileName, Name, Record, join
 DATA_SETTING = "FEM_REFERENCE_DATA"
 # Further folders, divided as those of PATH are, that files which a scene file names may be in.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
+COMMAND = "command"  # the solver that runs a program, which a scene file cannot choose
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
@@ -180,6 +181,14 @@ class Case(Record):
         if not any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
             want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
+
+    def check_solvers(self) -> None:
+        """Raise InputError where a scene file chooses the solver that runs a program."""
+        candidates = ((f"candidate[{i}]", one) for i, one in enumerate(self.candidate))
+        for key, one in (("reference", self.reference), *candidates):
+            if self.from_file and one.solver == COMMAND:
+                want = "another one: a scene file runs no program; --solver-command does"
+                raise InputError(join(self.place, f"{key}.solver"), f'"{COMMAND}"', want)
 
     @property
     def decides(self) -> list[Any]:

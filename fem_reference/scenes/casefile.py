@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect, Ramped, in_situ, moduli, name_of
+from fem_reference.effects import Effect, FieldEffect, Ramped, in_situ, moduli, name_of, region_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record, join, keys, parse
+from fem_reference.foundations.records import Record, check_once, check_used, join, keys, parse
 from fem_reference.io import texts
-from fem_reference.scenes import numbers, ranges
+from fem_reference.scenes import numbers, ranges, regions
 from fem_reference.scenes.case import HOME, Case
 from fem_reference.scenes.muscle import Frames, MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -171,8 +171,9 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
         table = table | {"effect": effects(table["effect"], place, kind)}
     case: Case = parse(record, table | whose, place)
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
-    _check_once(runs, join(place, "candidate"))
-    _check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
+    check_once(runs, join(place, "candidate"))
+    case.check_solvers()
+    check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     return _checked(case)
 
 
@@ -202,16 +203,18 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the
-    surface. A bulk modulus below the shear modulus is of no tissue, and usually a slip of units.
+    """An effect acts once in each region (two of a name would share the unknowns that it brings), a load once on each part of the
+    surface. A bulk modulus below the shear modulus there is of no tissue, and usually a slip of units.
     """
-    acting = [(name, getattr(effect, "on", "")) for name, effect in zip(names, effects, strict=True)]
+    places = [region_of(effect) for effect in effects]
+    acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
     known = [moduli([effect]) for effect in effects]
-    shear, stiff = sum(one.shear for one in known), [name for name, one in zip(names, known, strict=True) if one.shear]
-    for i, (name, on) in enumerate(acting):
-        if (name, on) in acting[:i]:
-            again = f'"{name}" on "{on}" a second time' if on else f'"{name}" a second time'
-            raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
+    for i, (name, on, region) in enumerate(acting):
+        if (name, on, region) in acting[:i]:
+            where = f' on "{on}"' if on else f' in "{region}"' if region else ""
+            raise InputError(join(place, f"effect[{i}].name"), f'"{name}"{where} a second time', "every effect once")
+        met = [j for j, other in enumerate(places) if known[j].shear and (not region or not other or other == region)]
+        shear, stiff = sum(known[j].shear for j in met), [names[j] for j in met]
         if 0 < known[i].bulk < shear:
             key = ".bulk" if "bulk" in type(effects[i]).model_fields else ""
             want = f"at least the shear modulus of {' and '.join(stiff)}, {shear:g} MPa"
@@ -230,14 +233,15 @@ def _check_names(case: MuscleCase) -> None:
     bones = [bone.name for bone in case.bone]
     attachments = [attachment.name for attachment in case.attachment]
     check_acting(case.effects, bones, case.frames, case.place)
-    _check_once([*attachments, FREE], join(case.place, "attachment"))
-    _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
-    _check_once([joint.name for joint in case.joint], join(case.place, "joint"))
-    _check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
-    _check_used(attachments, list(case.fibres.ends.items()), case.place)
+    check_once([*attachments, FREE], join(case.place, "attachment"))
+    check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
+    check_once([joint.name for joint in case.joint], join(case.place, "joint"))
+    check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
+    check_used(attachments, list(case.fibres.ends.items()), case.place)
     _check_forces(case)
     loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
-    _check_used([*attachments, FREE], loads, case.place)
+    check_used([*attachments, FREE], loads, case.place)
+    regions.check(case.region, case.effects, attachments, case.place)
 
 
 def _check_forces(case: MuscleCase) -> None:
@@ -252,19 +256,6 @@ def _check_forces(case: MuscleCase) -> None:
     if not case.attachment and not stays:
         want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
         raise InputError(join(case.place, "attachment"), "none", want)
-
-
-def _check_once(names: list[str], place: str) -> None:
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(place, f'the name "{twice}" twice', "every name once")
-
-
-def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> None:
-    for key, name in uses:
-        if name not in known:
-            want = f"one of {', '.join(known)}" if known else "a name that is there: there is none"
-            raise InputError(join(place, key), f'"{name}"', want)
 
 
 def _check_rest(case: MuscleCase) -> None:
@@ -287,10 +278,10 @@ def _check_rest(case: MuscleCase) -> None:
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
     """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
-    _check_once(bones, join(place, "bone"))
+    check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):
-            _check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
+            check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
             if effect.support is not None and in_situ.among(acting) is None:
                 got = f"{effect.support:g} mm"
                 raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')

@@ -63,8 +63,18 @@ class Chmd(Record):
     heads: tuple[PolylineFile, ...] = Field(min_length=1)
 
 
+class FibreTurn(Record):
+    """A rotation about an ``axis``, right-handed, by an ``angle``."""
+
+    axis: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name="an axis"))]
+    angle: Angle
+
+
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
+
+    ``turned``: the directions of the material are turned from those of these lines, the same everywhere; lengths are those of the
+    lines all the same.
 
     ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, go on in the muscle or along its surface
     to the nearest point of it.
@@ -75,6 +85,7 @@ class Fibres(Record):
     kohout_kukacka: KohoutKukacka | None = None
     chmd: Chmd | None = None
     complete: bool = False
+    turned: FibreTurn | None = None
 
     _check = one_of("polylines", "traced", "kohout_kukacka", "chmd")
 

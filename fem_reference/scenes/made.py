@@ -35,7 +35,7 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
 def _effect(entry: Any) -> Any:
     """An effect as the table that a file has."""
     if isinstance(entry, Record):
-        values = {key: value for key, value in entry.model_dump().items() if value is not None}
+        values = {key: value for key, value in entry.model_dump(by_alias=True).items() if value is not None}
         entry = {"name": name_of(entry)} | values
     if isinstance(entry, Mapping) and entry.get("name") in names(Record):
         return _with_units(find(str(entry["name"])), dict(entry))

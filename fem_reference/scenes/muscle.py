@@ -14,6 +14,7 @@ from fem_reference.foundations.units import Angle, AreaStiffness, Length, Length
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.fibres import Fibres
+from fem_reference.scenes.regions import CaseRegion
 
 # Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
 _FINEST = 1e-3
@@ -159,9 +160,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each of them is then cut into
-    eight (``refinements``), and the ``mesher``: good tetrahedra (``"quality"``), or in a box along the axes a grid of
-    boxes, each cut into six (``"block"``).
+    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each is then cut into eight (``refinements``),
+    and the ``mesher``: good tetrahedra (``"quality"``), or of a box along the axes a grid, each box cut into six (``"block"``).
     """
 
     surface: str
@@ -178,13 +178,21 @@ class VertexList(Record):
     value: int | None = None
 
 
+class Shift(Record):
+    """A displacement ``by`` a distance ``along`` a direction."""
+
+    along: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))]
+    by: Length
+
+
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone."""
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, no fibres."""
 
     file: str
     unit: LengthUnit
     clouds: tuple[str, ...] = Field(min_length=1)
     reach: PositiveLength
+    shift: Shift | None = None
 
 
 class Landmarks(Record):
@@ -254,13 +262,14 @@ class MuscleCase(Case):
     bone: tuple[CaseBone, ...] = Field(min_length=1)
     joint: tuple[CaseJoint, ...] = ()
     attachment: tuple[Attachment, ...] = ()
+    region: tuple[CaseRegion, ...] = ()
     fibres: Fibres
     frames: Frames
     uncertain: tuple[Uncertain, ...] = ()
 
     task = "solve"
     carries = frozenset({"surface", "lines"})
-    determined_by = frozenset({"muscle", "bone", "attachment", "fibres", "frames"})
+    determined_by = frozenset({"muscle", "bone", "attachment", "region", "fibres", "frames"})
     naming_files = frozenset({"surface", "file"})
 
     @property

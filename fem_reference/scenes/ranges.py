@@ -1,4 +1,6 @@
-"""The parameters of a case that nobody knows exactly: the ranges that its effects state, and those that the case states itself."""
+"""The unknown parameters of a case: the ranges that its effects state, and those that the case states itself."""
+
+import re
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.limits import Range
@@ -6,8 +8,12 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Runs with other fibres, bones or frames would be measured with those of the case.
-_VARIED = "a number of an effect, or the stiffness of an attachment: the fibres, bones and frames of all runs are those of the case"
+# Numbers beside those of effects with which all runs are measured alike: on the lines, bones and frames of the case.
+_OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
+_VARIED = (
+    "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
+    "the measured fibres, bones and frames of all runs are those of the case"
+)
 
 
 def ranges(case: MuscleCase) -> dict[str, Range]:
@@ -65,7 +71,6 @@ def check(case: MuscleCase) -> None:
             numbers.number(case, entry.key)
         except InputError as error:
             raise InputError(f"{place}.key", f'"{entry.key}"', error.want) from error
-        inside = numbers.parts(key)
-        if inside[0] != "effect" and not (inside[0] == "attachment" and inside[2:] == ["stiffness"]):
+        if numbers.parts(key)[0] != "effect" and not _OTHERS.fullmatch(key):
             raise InputError(f"{place}.key", f'"{entry.key}"', _VARIED)
         ends(case, entry.key, entry, place)

@@ -89,5 +89,5 @@ def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:
     """The settings of a choice, checked by its solver; ``place`` is where the scene makes the choice."""
-    record: type[Record] = find(choice.solver, place, task).settings
+    record: type[Record] = find(choice.solver, place, task).record(choice.settings, place)
     return parse(record, choice.settings, place)

@@ -4,7 +4,7 @@ import logging
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -103,42 +103,49 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Every frame wanted, once all of them are read and known to be of this surface; the cost is that of ``candidate.toml``.
+    """Every frame wanted, once all of them are read and known to be of this surface; the cost is that of ``candidate.toml``."""
+    folder = Path(settings.folder)
+    said = checked_about(folder, settings.unit)
+    frames = list(checked_frames(setup, folder, settings.unit))
+    for frame in frames:
+        sink(frame)
+    cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
+    message = f"read {len(frames)} frames from {_source(folder)}"
+    return Outcome("converged", message, {key: float(cost[key]) for key in cost})
+
+
+def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
+    """The frames wanted, one after the other, from the sequence in a ``folder``, in a ``unit`` [mm]; InputError at the first that
+    is missing or not of this surface.
 
     The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
     """
-    said = _checked_about(settings)
-    source = _source(Path(settings.folder))
-    sequence = _sequence(source, settings.unit, setup.interval)
+    source = _source(folder)
+    sequence = _sequence(source, unit, setup.interval)
     missing = [str(number) for number in setup.frames if number not in sequence]
-    if missing:
-        there = f"{min(sequence)} to {max(sequence)}" if sequence else "none"
-        got = f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})"
-        raise InputError(source, got, "every frame wanted")
-    frames = []
     for number in setup.frames:
+        if number not in sequence:
+            there = f"{min(sequence)} to {max(sequence)}" if sequence else "none"
+            got = f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})"
+            raise InputError(source, got, "every frame wanted")
         entry = sequence[number]
-        surface = entry if isinstance(entry, Surface) else files.read_surface(entry, settings.unit)
+        surface = entry if isinstance(entry, Surface) else files.read_surface(entry, unit)
         positions = _positions(surface, setup.surface)
-        frames.append(Frame(number, positions))
         if number == setup.frames[0]:
             _check_at_rest(surface.place, number, positions, setup.surface)
         size = diagonal(positions) / diagonal(setup.surface.points)
         if not size >= SMALLEST:
             got = f"a surface of {size:.2g} times the size at rest"
             raise InputError(surface.place, got, "one unit of length in all frames")
-    for frame in frames:
-        sink(frame)
-    cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
-    return Outcome("converged", f"read {len(frames)} frames from {source}", {key: float(cost[key]) for key in cost})
+        yield Frame(number, positions)
 
 
-def _checked_about(settings: RecordedSettings) -> About:
-    """The ``candidate.toml`` of the sequence; InputError where its unit is another than that of ``settings``."""
-    said = about(Path(settings.folder))
-    if said.unit is not None and length_unit(said.unit) != settings.unit:
-        place = f"{_about_file(Path(settings.folder))}: unit"
-        raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {settings.unit:g} mm")
+def checked_about(folder: Path, unit: float | None) -> About:
+    """The ``candidate.toml`` of the sequence; InputError where its unit is another one than ``unit`` [mm]."""
+    said = about(folder)
+    if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
+        place = f"{_about_file(folder)}: unit"
+        raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {unit:g} mm")
     return said
 
 

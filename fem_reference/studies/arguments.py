@@ -34,6 +34,13 @@ def is_of_body(reference: object, of: object) -> bool:
     return True
 
 
+def check_keys(keys: object) -> Sequence[str]:
+    """The keys; InputError unless they are a list of texts."""
+    if not isinstance(keys, Sequence) or isinstance(keys, str) or not all(isinstance(key, str) for key in keys):
+        raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
+    return keys
+
+
 def check_changes(changes: object) -> None:
     """Raise InputError unless they are keys and values, or None."""
     keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)
@@ -42,9 +49,9 @@ def check_changes(changes: object) -> None:
 
 
 def check_solver(solver: object, settings: Mapping[str, object]) -> None:
-    """Raise InputError unless ``solver`` is a name, or None without ``settings``."""
-    if solver is not None and not isinstance(solver, str):
-        raise InputError("solver", said(solver), "the name of a solver, or None")
+    """Raise InputError unless ``solver`` is a name or a function, or None without ``settings``."""
+    if solver is not None and not isinstance(solver, str) and not hasattr(solver, "__name__"):
+        raise InputError("solver", said(solver), "the name of a solver, a function, or None")
     if solver is None and settings:
         want = 'the name of the solver that they are of, such as solver="fenicsx"'
         raise InputError(f"settings {', '.join(settings)}", "no solver", want)

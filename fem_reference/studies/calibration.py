@@ -10,18 +10,59 @@ from fem_reference.assessment import calibration
 from fem_reference.assessment.calibration import Calibration, Measurement
 from fem_reference.assessment.uncertainty import Failure, Parameter
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.progress import Progress, reported
 from fem_reference.metrics import Measure, change, context_of, find, units
 from fem_reference.runs.store import Run
-from fem_reference.scenes import numbers
+from fem_reference.scenes import casefile, numbers
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
+from fem_reference.studies import arguments
 from fem_reference.studies.campaign import Workers, carry_out, shared_bench
 from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
+from fem_reference.studies.workflow import STORE
 
 _AXES = ("x", "y", "z")
 _WANT = "METRIC.STATISTIC, force.BONE, force.BONE.x, or position.VERTEX.x"
+
+
+def calibrate_case(
+    case: Case,
+    data: str | Path,
+    fit: Sequence[str],
+    *,
+    store: str | Path = STORE,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Fit numbers of a case to measurements, by runs of its reference at the size that the case has.
+
+    Parameters
+    ----------
+    case
+        The case of a muscle.
+    data
+        A CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them.
+    fit
+        Keys of numbers that have a range, such as ``"effect[0].mu"``.
+    store
+        The folder that runs are stored in.
+    progress
+        Called with each line of progress.
+
+    Returns
+    -------
+    Calibration
+        ``estimates``, each with its ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the
+        parameter; ``holds``: True where the fit converged, the law follows the data, and all numbers are determined.
+
+    """
+    muscle = casefile.muscle(arguments.check_case(case))
+    keys, folder = arguments.check_keys(fit), arguments.free_folder(store, "store")
+    with reported(progress):
+        return calibrate(muscle, path(data, "data"), keys, folder, Workers())
 
 
 def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, workers: Workers) -> Calibration:

@@ -159,8 +159,14 @@ def _executor(workers: Workers) -> Iterator[Executor]:
     """Processes of this machine, or the workers of a Dask scheduler, which hands the run of a worker that died to another one."""
     if workers.address is None:
         # Processes of their own and no forks: numba, PETSc and locks do not survive those.
+        before = set(multiprocessing.active_children())
         with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
-            yield executor
+            try:
+                yield executor
+            except BaseException:  # a stop too: else it would wait for the runs that workers are in
+                for worker in set(multiprocessing.active_children()) - before:
+                    worker.terminate()
+                raise
         return
     try:
         from distributed import Client

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,12 @@ from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.cost_study import CaseStudy, Study, load
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.assessment.fronts import COSTS, Point
+from fem_reference.assessment.fronts import COSTS, LOAD, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run, complete, seconds_per_frame
+from fem_reference.scenes.case import COMMAND
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, each
@@ -44,13 +46,26 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``, of a case that of its own name before those with another; InputError where there is none."""
+    """The studies below ``folder``, one of a case: that of its own name before those with another, with the points of the others
+    that are against the same truth, such as of a solver of one's own; InputError where there is none.
+    """
     known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
-    found = {study.case: study for study, name in sorted(known, key=lambda one: one[0].case == one[1])}
+    found = dict[str, CaseStudy]()
+    for study, _ in sorted(known, key=lambda one: one[0].case != one[1]):
+        found[study.case] = _with_points(found.get(study.case, study), study)
     if not found:
         want = "a folder with studies: fem-reference study CASE makes one"
         raise InputError("--out", f'"{folder}", where no study is', want)
     return list(found.values())
+
+
+def _with_points(study: CaseStudy, other: CaseStudy) -> CaseStudy:
+    """A study with the points of an ``other`` one that it has not, where both are of the same case and truth."""
+    if (study.features, study.truth, study.triangles) != (other.features, other.truth, other.triangles):
+        return study
+    own = {(point.name, str(point.choice)) for point in study.points}
+    more = tuple(point for point in other.points if (point.name, str(point.choice)) not in own)
+    return replace(study, points=study.points + more)
 
 
 def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
@@ -102,7 +117,8 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
     choice = {"solver": trial.choice.solver, **settings_of(trial)} | ({"scene": trial.changed} if trial.changed else {})
     found = ({}, {}) if run is None else (errors(run, truth, context), costs(run))
-    named = trial.scene.name, trial.choice.solver, trial.name, trial.knob, trial.value
+    solver = trial.name if trial.choice.solver == COMMAND else trial.choice.solver
+    named = trial.scene.name, solver, trial.name, trial.knob, trial.value
     return Point(*named, choice, *one.ended, *found)
 
 
@@ -113,8 +129,8 @@ def settings_of(trial: Trial) -> dict[str, object]:
         own = solvers.settings(trial.choice, trial.name)
     except InputError:  # the trial failed for it
         return given
-    fields = type(own).model_fields
-    return {key: value for key, value in given.items() if getattr(own, key) != fields[key].default}
+    fields = {key: field for key, field in type(own).model_fields.items() if not field.exclude}
+    return {key: value for key, value in given.items() if key in fields and getattr(own, key) != fields[key].default}
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
@@ -136,7 +152,9 @@ def costs(run: Run) -> dict[str, float]:
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
     found = {} if seconds is None else {"seconds_per_frame": seconds}
-    return found | {name: value for name, value in cost.items() if name in COSTS or name.startswith("seconds_")}
+    return found | {
+        name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")
+    }
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:

@@ -12,8 +12,9 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from fem_reference.assessment import error_bars
+from fem_reference.assessment.fronts import LOAD
 from fem_reference.foundations.records import Record
-from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memory
+from fem_reference.foundations.subprocesses import MachineTime, forget_peak_memory, peak_memory
 from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.of_case import CaseSetup
@@ -109,7 +110,7 @@ def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None)
     if watch is not None:
         list(seen(watch, writer.folder, writer.frames))  # stored by a process before this one
     forget_peak_memory()
-    began, solve, go_on = time.process_time(), wanted.offer.solve, wanted.offer.go_on
+    began, clock, solve, go_on = time.process_time(), MachineTime.now(), wanted.offer.solve, wanted.offer.go_on
     try:
         sofar = (given, wanted.settings, add)
         outcome = go_on(*sofar, writer.cut_off) if go_on else solve(*sofar)
@@ -120,7 +121,8 @@ def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None)
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
-    used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()}
+    load = clock.load()
+    used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
     outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own says what those used
     if not writer.frames:
         rest = given.rest

@@ -74,9 +74,10 @@ def is_material(effect: Effect) -> bool:
 
 
 def name_of(effect: Effect) -> str:
-    """The name of an effect in scene files, and where it acts if it does so on a part of the surface only."""
+    """The name of an effect in scene files, and where it acts if it does so in a region or on a part of the surface."""
     name = effects.name_of(effect)
-    return f"{name} on {effect.on}" if isinstance(effect, Load) else name
+    name += f" on {effect.on}" if isinstance(effect, Load) else ""
+    return name + (f" in {region}" if (region := effects.region_of(effect)) else "")
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:

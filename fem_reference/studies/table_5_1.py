@@ -12,7 +12,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.metrics import Measure, MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run, complete, seconds_per_frame
-from fem_reference.scenes.case import Candidate, SolverChoice
+from fem_reference.scenes.case import COMMAND, Candidate, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import each
@@ -38,17 +38,18 @@ _AVOIDS = ("collision", "contact", "voxels")  # settings with which a solver avo
 
 
 def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
-    """The table over ``scenes``, with runs in ``store``; ``foreign`` frames, by case, are read before anything is solved."""
+    """The table over ``scenes``, with runs in ``store``; frames of ``foreign`` solvers, by case, are read first."""
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {
-        name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(name, [])]
+        name: [bench.read(one.name, one, "--candidate") for one in foreign.get(name, []) if one.solver != COMMAND]
         for name, bench in benches.items()
     }
     there, missing = each(benches, lambda bench: bench.setup())
     for i, name in enumerate(there):
         log.info("scene %d of %d: %s", i + 1, len(there), name)
-        scenario, found = _on(benches[name], rows, read[name])
+        commands = [one for one in foreign.get(name, []) if one.solver == COMMAND]
+        scenario, found = _on(benches[name], rows, read[name], commands)
         scenarios.append(scenario)
         results += found
     if foreign:
@@ -58,7 +59,7 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
 
 
 def _on(
-    bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run]
+    bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run], commands: list[Candidate]
 ) -> tuple[Scenario, list[SolverResult]]:
     """The results of all solvers on the scene of a bench, the reference first."""
     scene = bench.scene
@@ -73,6 +74,7 @@ def _on(
         run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
         measures = measure(run, reference, context, METRICS)
         results.append(_result(scene, kind, run, measures, needs(scene, candidate, context)))
+    foreign = foreign + [complete(bench.obtain(one.name, one, "--solver-command"), scene.numbers) for one in commands]
     results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {}) for run in foreign]
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results

@@ -144,12 +144,13 @@ def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> It
         if offer.moves == "nothing" or settings in known:
             continue
         known.append(settings)
+        moves = offer.moved(solvers.settings(candidate, candidate.name))
         whole = Trial(case, candidate, candidate.name)
         yield whole
         yield from _settings(whole)
-        if offer.moves == "tetrahedra":
+        if moves == "tetrahedra":
             yield from _sizes(whole)
-        elif offer.moves == "surface":
+        elif moves == "surface":
             for text, other in surfaces.items():
                 yield Trial(other, candidate, candidate.name, TRIANGLES, text, {TRIANGLES: text})
 

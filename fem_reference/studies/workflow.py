@@ -1,6 +1,6 @@
 """The steps from a case to a page, one call each: the Python API."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
@@ -17,7 +17,7 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
-from fem_reference.solvers import fenicsx, recorded
+from fem_reference.solvers import command, fenicsx, recorded
 from fem_reference.studies import arguments, judging, refinement
 from fem_reference.studies.execution import Bench
 
@@ -47,7 +47,7 @@ def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> 
 
 def solve(
     case: Case,
-    solver: str | None = None,
+    solver: str | Callable[..., None] | None = None,
     *,
     store: str | Path = STORE,
     progress: Progress | None = None,
@@ -60,7 +60,8 @@ def solve(
     case
         What :func:`load_case` read.
     solver
-        The name of a solver, such as ``"pbd"``; without it the reference of the case, with the settings that the case has.
+        The name of a solver, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
+        :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case.
     store
         The folder that runs are stored in.
     progress
@@ -78,12 +79,20 @@ def solve(
     arguments.check_case(case)
     arguments.check_solver(solver, settings)
     folder = arguments.free_folder(store, "store")
-    choice: SolverChoice = case.reference
-    if solver is not None:
-        choice = SolverChoice(solver=solver, **settings) if settings else solvers.choice(case, solver)[1]
-    name = "reference" if solver is None else solver
+    name, choice = _chosen(case, solver, settings, folder)
     with reported(progress):
         return Bench(case, folder).obtain(name, choice, f'solver "{choice.solver}"')
+
+
+def _chosen(
+    case: Case, solver: str | Callable[..., None] | None, settings: dict[str, Any], folder: Path
+) -> tuple[str, SolverChoice]:
+    """The name of a run and its solver; a function is written below the ``folder`` of runs."""
+    if callable(solver):
+        return solver.__name__, command.of_function(solver, settings, folder / "functions")
+    if solver is None:
+        return "reference", case.reference
+    return solver, SolverChoice(solver=solver, **settings) if settings else solvers.choice(case, solver)[1]
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:

@@ -93,7 +93,7 @@ def _crowded(mesh: Cells) -> Cells:
     return replace(mesh, points=land.wall(angle - np.pi, around, depth))
 
 
-BOUND = "a bound that this project sets itself, as the numbers are readings of figures at second hand, whose error nobody states"
+BOUND = "a bound that this project sets itself, as the numbers are readings of figures at second hand, whose error no source states"
 HEART = partial(
     Entry,
     group="heart benchmark",

@@ -288,6 +288,30 @@ def test_a_stress_whose_difference_is_small_by_chance_is_known_as_well_as_the_ot
             assert (bar.unit, bar.values) == ("kPa", pytest.approx(1.25 * wanted * TIMES, rel=1e-9))
 
 
+def test_a_mean_over_fibres_that_cancels_by_chance_is_known_as_that_of_independent_ones() -> None:
+    """On larger tetrahedra one of two fibres is 0.2 % a frame longer and the other shorter: 0 in the mean, 0.2 % rms. The standard
+    error of a mean of two is that over the root of 2. The order is 1, so that all of it is left, and the safety 1.25.
+    """
+    lines = Polylines(np.array([[2.0, 0, -5], [2, 0, 5], [-2, 0, -5], [-2, 0, 5]]), np.array([0, 2, 4]))
+
+    def sheared(by: float) -> Run:
+        def moved(points: np.ndarray) -> np.ndarray:
+            return np.stack([points + by * t * np.outer(points[:, 0] * points[:, 2], [0, 0, 1]) for t in TIMES])
+
+        return replace(run(0.0), positions=moved(REST.points), fibres=lines, fibre_positions=moved(lines.points))
+
+    runs = Pair(sheared(0.0), sheared(1e-3), (4.0, 8.0), {})
+    found = error_bars.error_bars(runs, MeasurementContext.of(runs.fine, lines, (), None))
+    rms = {of: found.find(of, "fibre_length", "rms_percent").values for of in ("change", "deviation")}
+    assert rms["change"] == pytest.approx(1.25 * 0.2 * TIMES, abs=1e-9)
+    assert rms["deviation"][1:].min() > 0.1
+    for of, values in rms.items():
+        assert found.find(of, "fibre_length", "mean_percent").values == pytest.approx(values / np.sqrt(2), abs=1e-9)
+    # Edges are not fibres, and by symmetry those of the sphere are as long in the mean.
+    edges = found.find("deviation", "edge_extension", "mean").values
+    assert edges.max() < 0.1 * found.find("deviation", "edge_extension", "rms").values.max()
+
+
 def pulled(growth: float, size: float) -> Run:
     """``size`` [N] a frame along y at 30 mm along z from an axis along x."""
     force = np.outer(size * TIMES, [0.0, -1, 0])

@@ -24,13 +24,13 @@ def test_judging() -> None:
     assert shown.sentence.startswith("as it should be, for there is no pressure: volume 3 %")
     assert kept.sentence.startswith("though it should not be, for there is no pressure: volume 3 %")
     assert stress.doubted(blank, "", "it is flat") is blank
-    assert [stress.doubted(blank, "unstable", why).verdict for why in ("", "it is flat")] == ["degraded", "refused"]
+    assert [stress.doubted(blank, "unstable", why).verdict for why in ("", "it is flat")] == ["degraded", "no solution"]
     assert stress.doubted(shown, "unstable", "it is flat") is shown
     ended = replace(blank, status="inverted")
     bounds = [(Bound(quantity="volume", at_most=2.0), history)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"
-    assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "refused"
-    assert stress.unfinished(replace(blank, status="limit point"), "", bounds, "").verdict == "refused"
+    assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "no solution"
+    assert stress.unfinished(replace(blank, status="limit point"), "", bounds, "").verdict == "no solution"
     assert stress.unfinished(replace(ended, status="timed out"), "", bounds, "it is flat").verdict == "failed"
     first = [(bounds[0][0], replace(history, numbers=(0,), values=history.values[:1]))]
     assert stress.unfinished(ended, "a cell", first, "it is flat").verdict == "failed"

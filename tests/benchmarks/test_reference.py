@@ -41,6 +41,19 @@ def test_a_muscle_whose_data_is_not_here_has_no_costs(monkeypatch) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fem_lab")
+def test_the_second_check_is_measured_beside_its_run(monkeypatch, tmp_path) -> None:
+    case = str(small.write(tmp_path / "bar"))
+    monkeypatch.setattr(reference, "CHECKED", (case, "nowhere"))
+    made = reference.SecondCheck()
+    found = made.setup_cache()
+    seconds, share = (made.track_cost(found, case, cost) for cost in ("seconds", "share"))
+    assert 0 < seconds < 1
+    assert 0 < share < 10  # of a second and more: a process solves the bar
+    assert math.isnan(made.track_cost(found, "nowhere", "share"))
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("fem_lab")  # it skips where nothing can be solved
 def test_a_fusiform_body_is_measured_by_phase(monkeypatch) -> None:
     monkeypatch.setattr(reference, "BODIES", {"Q1/P0": (1, 3)})

@@ -10,6 +10,7 @@ import small
 from fem_reference import cli
 from fem_reference.assessment.cost_study import CaseStudy, facts
 from fem_reference.problems import muscle
+from fem_reference.report import study_page
 from fem_reference.scenes import casefile
 from fem_reference.studies.features import features as features_of
 from tests.assessment.test_recommendation import PERCENT, own_study, study
@@ -112,3 +113,16 @@ def test_all_studies_of_a_page_of_several_cases_are_read(bar, tmp_path: Path, ca
     several = [facts(one, {}) for one in (own_study(bar[1]), study("b", 80))]
     (tmp_path / "study" / "study.json").write_text(json.dumps(several))
     assert said(bar, tmp_path, capsys, "--error", "6 mm")[0] == cli.DONE
+
+
+def test_without_a_request_it_says_what_the_page_of_the_study_says(bar, tmp_path: Path, capsys) -> None:
+    case = own_study(bar[1])
+    status, text = said(bar, saved(tmp_path, case), capsys, "--json", str(tmp_path / "facts.json"))
+    lines = study_page.answer_texts(study_page.answered(case), "mm")
+    assert text.splitlines() == lines
+    found = json.loads((tmp_path / "facts.json").read_text())["answers"]
+    assert [one["limits"] for one in found] == [{"error": 1.0}, {"error": 5.0}, {"time": pytest.approx(1 / 60)}, {}]
+    assert status == (cli.VERDICT_FAIL if any("no setting" in line for line in lines[:-1]) else cli.DONE)
+    status, text = said(bar, tmp_path, capsys, "--error", "5 mm")
+    one = found[1]
+    assert f"{one['seconds_per_frame'] * 1000:.3g} ms a frame" in text

@@ -267,6 +267,7 @@ def test_effects_state_what_they_are() -> None:
     [
         (lambda: Energy().energy(state(np.eye(3))), "Energy has no energy"),
         (lambda: Load(on="top").traction(state(np.eye(3)), (0, 0, 1)), "Load has no traction"),
+        (lambda: Load(on="top").potential(state(np.eye(3)), (0, 0, 1)), "Load has no energy"),
         (lambda: Prestrain().elastic(state(np.eye(3))), "Prestrain has no elastic deformation"),
     ],
 )

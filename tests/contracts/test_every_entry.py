@@ -90,7 +90,8 @@ class Reading:
 
     def solve(self, body: Body, element: str, **settings: float) -> Run:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
-        around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.bones)}
+        names = [entry.name for entry in (*body.prescribed, *body.bones)]
+        around = {name: np.ones(3) for name in (*names, *(on for law in body.touching for on in law.forces))}
         points, scalars = body.mesh.points, defaultdict[str, float](lambda: 1.0)
         states = [
             Frame(number, points=points + (number - body.frames[0]), forces=around, moments=around, scalars=scalars)

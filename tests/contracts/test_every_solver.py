@@ -1,6 +1,8 @@
 """The solver contract: every solver meets the same small problem, and says the same kind of things about it."""
 
+import shlex
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": "10 kPa"}),
     effects.find("incompressible").model_validate({"bulk": "10 MPa"}),
 )
+RELAX = Path(__file__).parents[2] / "examples" / "own_command" / "relax.py"
 BEND = RigidMotion((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
 
 
@@ -54,6 +57,8 @@ def solved(name: str, given: MuscleProblem, folder) -> tuple:
             carry(points, given, number)
             files.write_surface(folder / f"frame_{number}.vtp", given.surface, points)
     frames: list[Frame] = []
+    if "command" in settings:
+        settings["command"] = shlex.join([sys.executable, str(RELAX)]) + " --iterations {iterations} {scene} {out}"
     record = solvers.settings(SolverChoice(solver=name, **settings), "case.toml")
     return solver.solve(given, record, frames.append), frames
 

@@ -259,6 +259,26 @@ def test_a_pressure_around_a_cube_has_no_resultant_and_works_on_its_volume() -> 
         assert work == pytest.approx(-0.008 * dV, rel=1e-6)
 
 
+def test_a_membrane_is_a_sheet_in_plane_stress_and_turns_with_the_body() -> None:
+    """Whatever the stretch along its normal. A strip that is free across has ``h mu/2 (l^2 + 2/l - 3)``, as a bar."""
+    membrane, normal = make("membrane"), np.array([2.0, -1.0, 2.0]) / 3
+    along, across = np.array([1.0, 2.0, 0.0]) / np.sqrt(5), np.cross(normal, [1.0, 2.0, 0.0]) / np.sqrt(5)
+    for stretch, thick in ((1.3, 0.5), (0.8, 2.0)):
+        F = (
+            stretch * np.outer(along, along)
+            + stretch**-0.5 * np.outer(across, across)
+            + thick * np.outer(normal, normal)
+        )
+        F += 0.4 * np.outer(along, normal)  # sheared below the sheet
+        wanted = 0.5 * 10 / 2 * (stretch**2 + 2 / stretch - 3)
+        assert membrane.potential(State(F=F), normal) == pytest.approx(wanted, rel=1e-12)
+        assert membrane.potential(State(F=TURN @ F), normal) == pytest.approx(wanted, rel=1e-12)
+    assert membrane.potential(State(F=np.eye(3)), normal) == pytest.approx(0, abs=1e-14)
+    half = make("membrane", **{"in": "fascia"})
+    assert half.potential(State(F=F, regions={"fascia": 0.5}), normal) == pytest.approx(wanted / 2, rel=1e-12)
+    assert (membrane.title, half.title) == ("Membrane on top", "Membrane on top in fascia")
+
+
 @pytest.mark.parametrize("name", RAMPED)
 def test_ramps_are_linear_between_knots_and_constant_beyond(name: str) -> None:
     amounts = [make(name).amount(frame) for frame in (-5, 0, 2.5, 10, 20, 30, 99)]

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from fem_reference import export
-from fem_reference.export import open_formats
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers.common import open_formats
 
 pytestmark = pytest.mark.slow
 

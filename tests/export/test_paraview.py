@@ -293,6 +293,8 @@ def test_the_worst_corner_of_a_bent_tetrahedron_is_the_least() -> None:
     moved = np.zeros((1, 10, 3))
     moved[0, :, 0] = -0.2 * nodes[:, 0] ** 2
     state = NodalState(moved, np.zeros((1, 0)), np.zeros((0, 0, 3)))
-    block = paraview.interior(Results(mesh, (), {0: state}), 0)
+    made = Results(mesh, (), {0: state}, regions={"tendon": lambda points: points[:, 0] / 2})
+    block = paraview.interior(made, 0)
     assert block.of_cells["det_F_at_worst_corner"] == pytest.approx([0.2])
     assert block.of_cells["det_F"] == pytest.approx([1 - 0.4 * 0.5])  # its middle is at x = 0.5
+    assert block.of_cells["region_tendon"] == pytest.approx([0.25])

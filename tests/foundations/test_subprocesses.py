@@ -1,5 +1,6 @@
 """Subprocesses import this copy of the package and nothing from the folder that they are started in."""
 
+import math
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import numpy as np
 
 import fem_reference
 from fem_reference.foundations import subprocesses
-from fem_reference.foundations.subprocesses import command, environment
+from fem_reference.foundations.subprocesses import MachineTime, command, environment
 
 
 def test_a_module_beside_the_user_is_not_taken_for_ours(tmp_path) -> None:
@@ -53,6 +54,33 @@ def test_processor_time_is_of_a_process_and_its_descendants() -> None:
     time.sleep(0.05)
     assert process.pid not in subprocesses.processor_times(os.getpid())
     assert subprocesses.processor_times(2**30) == {}
+
+
+def test_the_load_is_what_others_do(monkeypatch) -> None:
+    """Of 10 s on 2 cores, 12 s were busy, 8 s of them by this process: 4 of 20 s by others."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    for now, load in (
+        (MachineTime(10.0, 8.0, 12.0), 0.2),
+        (MachineTime(10.0, 8.5, 8.0), 0.0),  # rounded, or ended meanwhile
+        (MachineTime(10.0, 0.0, 30.0), 1.0),
+        (MachineTime(10.0, 8.0, math.nan), None),
+        (MachineTime(0.0, 0.0, 0.0), None),
+    ):
+        monkeypatch.setattr(MachineTime, "now", classmethod(lambda _, now=now: now))
+        assert MachineTime(0.0, 0.0, 0.0).load() == load
+    monkeypatch.setattr(MachineTime, "now", classmethod(lambda _: MachineTime(10.0, 8.0, 12.0)))
+    said = {"processor time": "8.0 s", "load by other processes": "20 % of the machine"}
+    assert subprocesses.spent_since(MachineTime(0.0, 0.0, 0.0)) == said
+
+
+def test_a_clock_counts_work_of_processes_that_have_ended() -> None:
+    before = MachineTime.now()
+    code = "import time\nend = time.process_time() + 0.3\nwhile time.process_time() < end: pass"
+    subprocess.run(command("-c", code), check=True)
+    after = MachineTime.now()
+    assert after.ours - before.ours >= 0.25  # in steps of 10 ms
+    assert after.all - before.all >= 0.25
+    assert 0 <= before.load() <= 1
 
 
 def test_a_folder_is_gone_at_the_end() -> None:

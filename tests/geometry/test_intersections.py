@@ -88,6 +88,35 @@ def test_only_edges_apart_from_the_triangle_count() -> None:
     assert_array_equal(self_intersections(hinge), [])
 
 
+@pytest.mark.parametrize("reach", [1e-9, 0.0, -1e-9])
+def test_a_tip_through_a_surface_by_a_millionth_of_a_micrometre_counts_and_one_that_touches_does_not(reach) -> None:
+    """At the hip, where coordinates are rounded by 6e-14 mm: a spike over a plate of two triangles in the plane z = -431 mm."""
+    plate = HIP + np.array([[0.0, 0, 0], [3, 0, 0], [3, 3, 0], [0, 3, 0]])
+    spike = HIP + np.array([[1.0, 1.4, -reach], [0.8, 1.2, 4], [1.3, 1.1, 4], [1.1, 1.7, 4]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], [4, 7, 5], [5, 7, 6]])
+    both = Surface(np.concatenate([plate, spike]), triangles)
+    assert_array_equal(self_intersections(both), [1, 2, 3, 4] if reach > 0 else [])
+
+
+def test_what_overlaps_in_one_plane_or_folds_back_at_an_edge_does_not_count() -> None:
+    flat = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.3, 0.3, 0], [2, 1, 0], [1, 2, 0], [0.4, 0.2, 0]])
+    overlapping, folded = np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1, 2], [1, 0, 6]])
+    for triangles in (overlapping, folded):
+        assert len(self_crossings(Surface(flat, triangles))) == 0
+
+
+def test_a_folded_sheet_crosses_where_brute_force_says() -> None:
+    """Sheets of 4 x 4 cells, crumpled at random: neighbours by a vertex cross each other as well as triangles far apart."""
+    corner, shared = np.arange(25).reshape(5, 5)[:-1, :-1].ravel(), set[int]()
+    sheet = np.concatenate([corner[:, None] + [0, 5, 6], corner[:, None] + [0, 6, 1]])
+    flat = np.stack([*np.divmod(np.arange(25), 5), np.zeros(25)], axis=1)
+    for seed in range(6):
+        crumpled = Surface(flat + np.random.default_rng(seed).uniform(-0.9, 0.9, (25, 3)), sheet)
+        shared |= {len(set(sheet[one]) & set(sheet[other])) for one, other in self_crossings(crumpled)}
+        assert_array_equal(self_intersections(crumpled), _by_brute_force(crumpled))
+    assert shared == {0, 1}
+
+
 @pytest.mark.parametrize(
     ("name", "count"),
     [("muscles/adductor_brevis", 3), ("muscles/gluteus_maximus", 0), ("bones/femur_report", 0)],

@@ -115,6 +115,17 @@ def test_what_crosses_an_obstacle_has_failed(monkeypatch) -> None:
     assert around([BALL], np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])).failed.tolist() == [True]
 
 
+@pytest.mark.parametrize("radius", [0.05, 1e-4])
+def test_what_crosses_an_obstacle_that_is_smaller_than_a_step_has_failed(monkeypatch, radius) -> None:
+    """30 mm in 200 steps: none of them ends in the ball, nor in the middle of the flat ellipsoid."""
+    monkeypatch.setattr(winding, "met", lambda _, string: [() for _ in string])
+    starts, ends = np.array([[0.0, 0, 0], [0, 1, 0]]), np.array([[0.0, 0, 30], [0, 1, 30]])
+    for radii in (np.full(3, radius), np.array([5.0, 0.5, radius])):
+        # A path a millimetre beside it is found.
+        assert around([Quadric(at(0, 0, 7.3144), radii)], starts, ends).failed.tolist() == [True, False]
+    assert not around([Quadric(at(0, 0, 7.3144), np.array([5.0, 0.5, np.inf]))], starts[1:], ends[1:]).failed.any()
+
+
 @pytest.mark.parametrize("radius", [1e-12, 1e-30])
 def test_around_what_has_hardly_a_size_no_path_is_no_number(radius) -> None:
     """Newton's method cannot bend a path around it: not found, and never not-a-number."""

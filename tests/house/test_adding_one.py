@@ -216,7 +216,7 @@ KINDS = {
     ),
     "effect": New(
         {"fem_reference/effects/own_effect.py": EFFECT},
-        {"tests/contracts/test_every_effect.py": 8, "tests/export/test_open_formats.py": 1},
+        {"tests/contracts/test_every_effect.py": 8, "tests/solvers/common/test_open_formats.py": 1},
         {},
     ),
     "metric": New(

@@ -12,7 +12,7 @@ from fem_reference.solvers.fenicsx import processes
 
 pytestmark = pytest.mark.slow
 
-STRETCHED_BLOCK = pages.snippet("docs/python.md", "Prescribed")
+STRETCHED_BLOCK = pages.snippet("docs/python.md", "pulled")
 
 
 def test_every_public_name_is_there_and_said_what_it_is() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import every_page
+import numpy as np
 import pytest
 from browser import PROGRAM, Browser
 
@@ -68,6 +69,38 @@ def test_printed_it_is_light_whole_and_without_controls(browser, written, kind) 
     printed = base64.b64decode(browser.call("Page.printToPDF", printBackground=False, preferCSSPageSize=True)["data"])
     assert printed.startswith(b"%PDF-")
     assert browser.complaints() == []
+
+
+def shade(browser: Browser, element: str) -> float:
+    """The mean difference of the right edge of an element from the paper beside its middle [of 255]."""
+    strip = browser.picture(element)[:, -4:]
+    return float(np.abs(strip - browser.picture(element)[:4, 200:204].mean(axis=(0, 1))).mean())
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("kind", ["study", "verify", "effects", "ranking"])
+def test_a_table_that_is_cut_shows_it(browser, written, kind, scheme) -> None:
+    """A shadow at the edge where more is, and a line above it; neither where all is seen."""
+    show(browser, written[kind], PHONE, scheme=scheme)
+    browser.ask("[...document.querySelectorAll('.wide')].find(it => it.scrollWidth > it.clientWidth + 40).id = 'cut'")
+    browser.wait("document.querySelector('#cut[tabindex]')")
+    assert "scroll for more" in browser.ask("getComputedStyle(document.querySelector('#cut'), '::before').content")
+    before = shade(browser, "#cut")
+    browser.ask("document.querySelector('#cut').scrollLeft = 1e6")
+    assert before > shade(browser, "#cut") + 10
+    show(browser, written[kind], 2600, scheme=scheme)
+    assert not browser.ask("document.querySelector('.wide[tabindex]')")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_names_in_three_dimensions_are_seen(browser, written, scheme) -> None:
+    show(browser, written["comparison"], DESK, scheme=scheme)
+    browser.ask("document.querySelector('.viewer-stage').scrollIntoView()")
+    browser.wait("document.querySelector('.viewer-label b')?.textContent")
+    colours = browser.ask("[...document.querySelectorAll('.viewer-label b')].map(it => getComputedStyle(it).color)")
+    for colour in colours:
+        ink = [int(one) for one in re.findall(r"\d+", colour)]
+        assert (min(ink) > 150) if scheme == "dark" else (max(ink) < 100)
 
 
 def rows(browser: Browser, table: str) -> list[str]:

@@ -32,8 +32,8 @@ from fem_reference.problems.anatomy import draped, facets_under, fan, pick
 from fem_reference.problems.estimates import estimates
 from fem_reference.problems.fibre_ends import REACHES, attached_ends, ends_of
 from fem_reference.scenes import casefile
-from fem_reference.scenes.fibres import Fibres
-from fem_reference.scenes.muscle import Attachment, MuscleCase
+from fem_reference.scenes.fibres import Fibres, FibreTurn
+from fem_reference.scenes.muscle import Attachment, MuscleCase, Shift
 
 BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
 FLOOR = Surface(np.array([[-50.0, -50, -1], [50, -50, -1], [0, 80, -1]]), np.array([[0, 1, 2]]))
@@ -57,10 +57,11 @@ def _listed(folder: Path, text: str, **keys: Any) -> np.ndarray:
 
 
 def _outline(
-    folder: Path, text: str, reach: str = "1 mm", clouds: tuple[str, ...] = ("A",), unit: str = "mm"
+    folder: Path, text: str, reach: str = "1 mm", clouds: tuple[str, ...] = ("A",), unit: str = "mm", **keys: object
 ) -> np.ndarray:
     (folder / "marks.csv").write_text(text)
-    return _pick(folder, bone=GROUND, outline={"file": "marks.csv", "unit": unit, "clouds": clouds, "reach": reach})
+    keys |= {"file": "marks.csv", "unit": unit, "clouds": clouds, "reach": reach}
+    return _pick(folder, bone=GROUND, outline=keys)
 
 
 def _marks(points: np.ndarray, cloud: str = "A") -> str:
@@ -122,6 +123,14 @@ def test_an_outline_takes_what_is_near_its_patch(tmp_path: Path) -> None:
     inside = (x >= 6) & (x <= 14) & (y >= 5 + abs(x - 10) / 4) & (y <= 15 - abs(x - 10) / 4) & (z == 0)
     beside = (np.abs(x - 10) <= 4) & (np.abs(y - 10) <= 6) & (z == 0)
     assert set(np.flatnonzero(inside)) <= set(found) <= set(np.flatnonzero(beside))
+
+
+def test_a_shifted_outline_takes_what_is_that_much_further(tmp_path: Path) -> None:
+    """Landmarks of a plane bone, 4 mm further: two of the 2 mm between vertices."""
+    marks = _marks(np.array([(x - 3, y, 0) for x, y in RING]))
+    there = _outline(tmp_path, marks, "1.3 mm")
+    found = _outline(tmp_path, marks, "1.3 mm", shift=Shift(along=(2, 0, 0), by="4 mm"))
+    assert {*map(tuple, BLOCK.points[found])} == {*map(tuple, BLOCK.points[there] + np.array([4.0, 0, 0]))}
 
 
 def test_an_outline_does_not_depend_on_unit_order_or_place(tmp_path: Path) -> None:
@@ -401,8 +410,15 @@ def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:
     )
     assert len(lines.lengths()) == case.fibres.traced.count
     assert lines.lengths() == pytest.approx(40, rel=1e-2)
-    along = direction(np.zeros(2, int), np.array([[5.0, 5, 20], [3, 4, 11]]))
-    assert along == pytest.approx(np.tile([0.0, 0, 1], (2, 1)), abs=1e-6)
+    places = np.zeros(2, int), np.array([[5.0, 5, 20], [3, 4, 11]])
+    assert direction(*places) == pytest.approx(np.tile([0.0, 0, 1], (2, 1)), abs=1e-6)
+    turned = FibreTurn(axis=(-2, 0, 0), angle="30 deg")  # right-handed: z goes to y
+    leaning = case.model_copy(update={"fibres": case.fibres.model_copy(update={"turned": turned})})
+    same, direction = anatomy.fibres_of(leaning, surface, fill)
+    assert np.array_equal(same.points, lines.points), "what is measured stays"
+    assert direction(*places) == pytest.approx(np.tile([0.0, 0.5, np.sqrt(0.75)], (2, 1)), abs=1e-6)
+    along = np.array([0, 0, 1.0])
+    assert (anatomy.lean(case, along), anatomy.lean(leaning, along)) == (0, pytest.approx(np.sin(np.radians(60))))
 
 
 @pytest.mark.parametrize("degrees", [0, 15])

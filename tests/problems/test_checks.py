@@ -76,6 +76,7 @@ def test_components_are_axes(components) -> None:
     ("changes", "message"),
     [
         ({"name": 3}, r"prescribed\.3: name and on: got int 3"),
+        ({"name": np.zeros(0)}, r"prescribed\.\[\]: name and on: got "),
         ({"on": None}, r"prescribed\.top: name and on: got .*NoneType None"),
         ({"on": "lid"}, 'on: got "lid", want a region of the body'),
         ({"path": 3}, r"prescribed\.top\.path: got int 3, want a function of points and a frame number"),

@@ -8,6 +8,7 @@ import random_scenes
 from auto_scenes import STILL, pennate, scene_of
 
 from fem_reference import cli
+from fem_reference.effects import make
 from fem_reference.problems import muscle, of_case
 from fem_reference.problems.estimates import STRESS_TOLERANCE, TOLERANCE, estimates, stretched
 from fem_reference.problems.setup import Setup
@@ -138,3 +139,16 @@ def test_the_passive_fibres_of_the_shipped_muscle_are_estimated_as_they_were_mea
     (passive,) = (one for one in of_case.explained(case) if one.effect.title == "FibrePassive")
     assert passive.needed
     assert 3.5 / 2 < passive.indicator.estimate < 3.1 * 2
+
+
+def test_a_muscle_with_a_stiff_region_is_as_soft_as_its_softest_place(tmp_path) -> None:
+    """What is stiffer somewhere makes nothing look needless: neither its modulus nor the tension of its fibres counts elsewhere."""
+    scene, plain = scene_of(tmp_path, ""), {"region": "tendon"}
+    stiff = make("neo_hooke", mu=1.0, **{"in": "tendon"})
+    fibres = make("fibre_passive", stress=0.3, p1=0.05, p2=6.6, optimal_stretch=0.9, linear_from=1.4)
+    rest = replace(muscle.setup(scene), regions={"tendon": lambda points: np.where(points[:, 2] < 5, 1.0, 0.0)})
+    there = scene.model_copy(update={"effect": (*scene.effect, stiff, fibres.model_copy(update=plain))})
+    everywhere = scene.model_copy(update={"effect": (*scene.effect, fibres)})
+    known = estimates(there, rest)
+    assert known.shear == pytest.approx(0.01, rel=1e-5)
+    assert (known.tension, estimates(everywhere, rest).tension > 0) == (0, True)

@@ -1,5 +1,7 @@
 """The external load of a bar by hand: its weight, in the middle; nothing where an effect does not say."""
 
+from dataclasses import replace
+
 import numpy as np
 import shapes
 from numpy.testing import assert_allclose
@@ -38,3 +40,8 @@ def test_a_material_is_no_load() -> None:
     load = external_load(bar(make("neo_hooke", mu="10 kPa")), 5)
     assert not load.force.any()
     assert not load.moment.any()
+
+
+def test_the_weight_of_a_region_is_not_that_of_the_whole() -> None:
+    there = replace(bar(WEIGHT.model_copy(update={"region": "fat"})), regions={"fat": lambda points: points[:, 0] / 2})
+    assert external_load(there, 5) is None

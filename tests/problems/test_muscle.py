@@ -256,6 +256,23 @@ def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
 
 
 @pytest.mark.slow
+def test_a_shifted_attachment_moves_the_clamped_area_and_not_the_fibres(bar) -> None:
+    """An outline of 6 mm on the end of 10 mm of the bar, 2 mm further: runs of both are measured on the same lines."""
+    marks = "\n".join(f"top,{i},{x},{y},40.5" for i, (x, y) in enumerate([(2, 2), (8, 2), (8, 8), (2, 8)]))
+    (bar / "marks.csv").write_text(f"cloud,landmark,x,y,z\n{marks}\n")
+    outline = {"file": "marks.csv", "unit": "mm", "clouds": ["top"], "reach": "1 mm"}
+    outline["shift"] = {"along": [1, 0, 0], "by": "0 mm"}
+    end = {"name": "insertion", "bone": "lid", "outline": outline}
+    own = casefile.read_muscle(bar, {"attachment[1]": end, "frames.every": 10})
+    there, moved = (
+        build_scene(casefile.with_numbers(own, {"attachment[1].outline.shift.by": far})) for far in (0.0, 2.0)
+    )
+    assert np.array_equal(there.fibres.points, moved.fibres.points)
+    middles = [one.surface.points[one.attached[1].vertices].mean(axis=0) for one in (there, moved)]
+    assert middles[1] - middles[0] == pytest.approx([2.5, 0, 0], abs=1e-9), "2.5, 5 and 7.5 mm, then 5, 7.5 and 10 mm"
+
+
+@pytest.mark.slow
 def test_a_vertex_has_one_bone(bar) -> None:
     scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
     with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment has"):

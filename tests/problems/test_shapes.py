@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Cells, Kind, reference_nodes
@@ -293,3 +294,17 @@ def test_an_octant_of_a_ball_has_its_volume_and_grows_evenly(kind: Kind) -> None
     layers = np.diff(on_axis[on_axis > 1 - 1e-9])
     assert layers[1:] / layers[:-1] == pytest.approx(layers[1] / layers[0], rel=1e-9)
     assert layers[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_joined_pieces_stay_apart_and_keep_their_regions() -> None:
+    left, right = (
+        shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "hexahedron"),
+        shapes.box((2, 1, 1), (1.0, 1.0, 1.0), "hexahedron"),
+    )
+    both = shapes.joined({"left": left, "right": right})
+    assert (len(both.points), len(both.cells), len(both.facets)) == (8 + 12, 3, 12)
+    assert not set(both.cells[0]) & set(both.cells[1:].ravel())
+    assert both.points[both.cells[1:]].tolist() == right.points[right.cells].tolist()
+    assert both.points[both.facets["right_x1"]].tolist() == right.points[right.facets["x1"]].tolist()
+    with pytest.raises(InputError, match="pieces: got 2 kinds and degrees of cells, want one"):
+        shapes.joined({"left": left, "right": shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")})

@@ -32,6 +32,18 @@ def test_stresses_of_a_stretched_bar_are_those_of_the_closed_form() -> None:
     assert both[1999] == pytest.approx(both[0], rel=1e-12)  # of parts that are evaluated one after the other
 
 
+def test_a_law_of_a_region_has_its_share_of_the_stress() -> None:
+    """Half of a bar has a law with four times the shear modulus; a law that is left out counts where it would act."""
+    mesh, stretch, mu = shapes.box((1, 1, 2), (1.0, 1.0, 2.0)), 1.2, 0.01
+    half = {"tendon": lambda points: np.where(points[:, 2] < 1, 1.0, 0.0)}
+    soft, stiff = (make("neo_hooke", mu=one, **{"in": at}) for one, at in ((mu, "not tendon"), (4 * mu, "tendon")))
+    positions = mesh.points @ np.diag([stretch**-0.5, stretch**-0.5, stretch])
+    found = StressSamples(mesh, None, half).sizes(positions, [(soft, 1.0)], [(stiff, 1.0)])
+    uniaxial = mu * (stretch**2 - 1 / stretch) * np.sqrt(2 / 3)
+    assert found.acts == pytest.approx(uniaxial / np.sqrt(2), rel=1e-9)
+    assert found.added == pytest.approx([4 * uniaxial / np.sqrt(2)], rel=1e-9)
+
+
 def test_a_prestretch_counts_by_what_it_changes_of_the_rest() -> None:
     """At rest the energies see a bar stretched by 1.1: its stress. What is stretched by that already has a stress of its own, which
     is no part of what the prestretch adds.

@@ -51,9 +51,11 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
 def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is solved" in html(comparison)
     text = html(with_bars(comparison))
-    # The band of the model stands beside the numerical bars, and only there.
-    assert "differ from images of the same muscles by 1.70 to 5.20" in text
-    assert "images of the same muscles" not in html(comparison)
+    # The bands of the model stand beside the numerical bars of what is in the headline, and without bars too.
+    for whole in (text, html(comparison)):
+        assert "<b>Surface</b>: 1.70 to 5.20&#8239;mm (finite element muscles of the hip against MRI" in whole
+        assert "<b>Volume</b>: 2 to 6&#8239;%" in whole
+        assert "<b>Fibre length</b>: no band is known" in whole
     assert "(4 mm instead of 2 mm)" in text
     assert "order 1.50 in general" in text
     names = ", ".join(attachment.name for attachment in comparison.scene.attachment)
@@ -130,7 +132,9 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     assert "3 of 5 frames were reached, up to frame 20" in html(with_bars(one))
     text = re.sub(r"<script.*?</script>", "", html(one), flags=re.DOTALL)
     assert "The reference (fenicsx): diverged.</b> no equilibrium near the foot; try smaller steps. 3 of 5 " in text
-    assert '<span class="badge fail">fail</span> <b>reference</b>: 1 of 1 of its own checks met; diverged' in text
+    top = re.search(r"<tr><th>reference</th>.*?</tr>", text, re.DOTALL)[0]
+    assert '<span class="badge fail">fail</span>' in top
+    assert "1 of 1 of its own checks met; diverged" in top
     assert "not a number" not in text
     assert "frame 40" not in text.replace("from frame 0", "")
     unmet = replace(one.verdicts[0], word="fail", value=NAN, frame=30)

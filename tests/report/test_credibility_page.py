@@ -31,6 +31,16 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert ">yes</td>" in text, "an order is met or not, and no number"
 
 
+def test_the_first_thing_said_is_what_is_validated_and_what_is_not(tmp_path) -> None:
+    of = {grade: names for grade, names, _ in credibility_page.by_grade(found())}
+    assert list(of) == ["validated", "indicative", "outside", "verified only"]
+    assert sum(map(len, of.values())) == len(found().rows), "each quantity once"
+    none = replace(found(), rows=found().rows[2:])
+    assert credibility_page.by_grade(none)[0][:2] == ("validated", [])
+    text = html.unescape(report.write(credibility_page.page(none), tmp_path / "new", "credibility").read_text())
+    assert '<span class="badge validated">validated</span> <b>nothing</b>' in text
+
+
 def test_what_it_says_in_a_line() -> None:
     """Measurements apart from other models."""
     said = "4 quantities: 1 validated, 1 indicative, 1 outside, 1 verified only; 5 of 6 measurements within their uncertainty, "

@@ -1,6 +1,7 @@
 """The head of the page says what was asked: whether a candidate was judged, and the reference's own checks beside it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -48,16 +49,28 @@ def head(folder: Path) -> str:
     return text[text.index("<header>") : text.index("</header>")]
 
 
+def row(folder: Path, name: str) -> str:
+    """The row of a run in the table at the top."""
+    found = re.search(rf"<tr><th>{name}</th>.*?</tr>", head(folder), re.DOTALL)
+    return found[0] if found else ""
+
+
 def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path: Path) -> None:
     assert cli.main(words) == cli.DONE
-    found = head(tmp_path)
-    assert '<span class="badge not">not judged</span> <b>pbd</b>: ' in found
-    assert "surface off by up to 2 mm rms; " in found  # 0.1 mm times frame 20, everywhere
-    assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
+    mine, reference = row(tmp_path, "pbd"), row(tmp_path, "reference")
+    assert '<span class="badge not">not judged</span>' in mine
+    assert '<td>2&#8239;<span class="unit">mm</span></td>' in re.sub(
+        r"\s*\n\s*", "", mine
+    )  # 0.1 mm times frame 20, everywhere
+    assert '<span class="badge doubtful">doubtful pass</span>' in reference
     assert (
-        "unstable equilibrium in 1 of 5 frames; det F falls to 0.0500; cells are outside the range that a law " in found
+        "1 of 1 of its own checks met; doubtful: unstable equilibrium in 1 of 5 frames; doubtful: det F " in reference
     )
-    assert "is meant for in 2 of 5 frames, first in 15" in found
+    assert "is meant for in 2 of 5 frames, first in 15" in reference
+    page = (tmp_path / "out" / "bar" / "report.html").read_text()
+    below = page[page.index("Deviations at their worst frames") :]
+    for one in ("Fibre length", "Volume", "Surface"):  # each number of the top is in the table below, with its frame
+        assert one in below
 
 
 def test_a_doubtful_pass_is_one_word_on_the_page_in_json_and_in_the_terminal(words, tmp_path: Path, capsys) -> None:
@@ -96,16 +109,16 @@ def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
             "-13.5 % of the energy without work at frame 10: the body jumped, or the load steps are too large"
         )
         assert f"reference: doubtful, {why}" in printed
-        assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>' in head(tmp_path)
+        assert '<span class="badge doubtful">doubtful pass</span>' in row(tmp_path, "reference")
         assert "Doubtful: \N{MINUS SIGN}13.5 % of the energy came or went without work" in page
     assert "by Simpson's, with a state halfway" in page
 
 
 def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: Path, capsys) -> None:
     assert cli.main([*words, "--limit", "surface_deviation.max=2.1 mm"]) == cli.DONE
-    assert '<span class="badge pass">pass</span> <b>pbd</b>' in head(tmp_path)
+    assert '<span class="badge pass">pass</span>' in row(tmp_path, "pbd")
     assert cli.main([*words, "--limit", "surface_deviation.max=2.1 mm", "--limit", "surface_deviation.rms=1.9 mm"]) == 1
-    assert '<span class="badge fail">fail</span> <b>pbd</b>' in head(tmp_path)
+    assert '<span class="badge fail">fail</span>' in row(tmp_path, "pbd")
     for limit, want in (
         ("surface_deviation.max", '--limit: got "surface_deviation.max", want METRIC.STATISTIC=VALUE'),
         ("surface_deviation.max=2 kPa", '--limit: got "surface_deviation.max=2 kPa", want a value in mm: '),

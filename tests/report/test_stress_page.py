@@ -15,12 +15,12 @@ from fem_reference.report import stress_page
 
 def test_the_counts_and_the_sentences_of_what_is_not_ok_are_printed(comparison) -> None:
     found = every_page.stress(comparison)
-    counts = "2 hard cases by 3 solvers: 1 ok, 1 degraded, 2 failed, 1 refused, 1 inconclusive"
+    counts = "2 hard cases by 3 solvers: 1 ok, 1 degraded, 1 failed, 1 not applicable, 1 no solution, 1 inconclusive"
     assert stress_page.summary(found) == counts
     lines = stress_page.text(found).splitlines()
     assert lines[0] == counts
     assert "  pbd: It is degraded." in lines
-    assert not any(line.endswith(("It is ok.", "It is refused.")) for line in lines)
+    assert not any(line.endswith(("It is ok.", "It is not applicable.", "It is no solution.")) for line in lines)
 
 
 def test_the_page_has_a_cell_for_every_case_and_solver(comparison) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from fem_reference import report
 from fem_reference.assessment.cost_study import CaseStudy, Study
-from fem_reference.assessment.fronts import Point, match
+from fem_reference.assessment.fronts import LOAD, Point, match
 from fem_reference.assessment.recommendation import recommend
 from fem_reference.report import study_page
 from tests.assessment.test_recommendation import RMS, TIME, features, own_study
@@ -227,3 +227,43 @@ def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     # At most 10 mm: 5 mm were measured in 3 ms; at most 2 mm: the truth.
     assert "0.00300 ssweeps = 3, 5 mm measured" in plain
     assert "reference, as it is, the truth itself" in plain
+
+
+def test_times_of_a_machine_that_was_busy_are_marked() -> None:
+    case = study()
+    timed = (replace(one, costs=one.costs | {LOAD: 0.25 if one.value == "4" else 0.05}) for one in case.points)
+    busy = Study((replace(case, points=tuple(timed)),))
+    warning = "2 of 8 times were measured while other processes kept 25 % of the machine busy"
+    assert warning in study_page.page(busy).html()
+    assert warning in study_page.text(busy)
+    assert warning not in study_page.text(Study((case,)))
+
+
+def test_it_says_first_what_to_take_and_so_does_recommend() -> None:
+    """Errors of fenicsx fall from 0.8 mm by first order, those of pbd from 11.3 mm by half an order; the bar is 0.2 mm."""
+    case = study()
+    lines = study_page.answer_texts(study_page.answered(case), "mm")
+    assert lines == [
+        "Within 1 mm: fenicsx, as it is, 1 mm, 10 ms a frame",
+        "Within 5 mm: fenicsx, as it is, 1 mm, 10 ms a frame",
+        "At 60 frames a second: fenicsx, as it is, 1 mm, 10 ms a frame",
+        "At the knee of the front: fenicsx (sweeps = 4), 0.400 mm, 40 ms a frame",
+    ]
+    page = study_page.page(Study((case,)))
+    shown = page.html()
+    header = shown[shown.index("<header>") : shown.index("</header>")]
+    for line in lines:
+        assert f"<li>{line}.</li>" in header
+        assert line in study_page.text(Study((case,)))
+    assert [text for _, _, text in page.headlines] == lines
+    others = replace(case, points=tuple(one for one in case.points if one.solver == "pbd"))
+    assert study_page.answer_texts(study_page.answered(others), "mm")[0] == (
+        "Within 1 mm: no setting; the nearest is pbd (sweeps = 8), 4.20 mm, 80 ms a frame"
+    )
+    assert "<li>" not in study_page.page(Study((replace(case, points=()),))).html().split("</header>")[0]
+
+
+def test_of_several_cases_each_answers_in_its_own_section() -> None:
+    shown = study_page.page(Study((study(), study("knee")))).html()
+    assert "<li>Within" not in shown[: shown.index("</header>")]
+    assert shown.count("<li>Within 5 mm: ") == 2

@@ -16,9 +16,9 @@ def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> N
         "In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within 2 mm of this case's, rms, "
         "where the reference itself is known to 0.100 mm. Most of it is by mooney_rivlin c1 (70 % of the variance)."
     )
-    assert inside == "Candidates whose surface errs less than what nobody knows: fast."
+    assert inside == "Candidates whose surface errs less than the unknown parameters move it: fast."
     assert undecided.endswith("with the error bar of the reference: near.")
-    assert outside == "Candidates whose surface errs more than what nobody knows: far."
+    assert outside == "Candidates whose surface errs more than the unknown parameters move it: far."
 
 
 def test_the_page_shows_ranges_with_source_and_what_was_not_varied() -> None:

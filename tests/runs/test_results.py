@@ -155,6 +155,20 @@ def test_energies_of_effects_are_their_densities_times_the_volume() -> None:
     assert twice["neo_hooke"] == pytest.approx(2 * found["neo_hooke"], rel=1e-12)
 
 
+def test_energy_and_stress_of_a_law_are_those_of_its_region() -> None:
+    """The half of a box below a plane through faces of its tetrahedra has its own law: the stress jumps there."""
+    stretch, volume, middle = 1.3, 4.0 * 6 * 8, 4.0
+    state = moved(affine(np.diag([stretch, stretch**-0.5, stretch**-0.5])))
+    laws = tuple(make("neo_hooke", mu=mu, **{"in": at}) for mu, at in (("10 kPa", "not tendon"), ("40 kPa", "tendon")))
+    made = Results(
+        MESH, laws, {30.0: state}, regions={"tendon": lambda points: np.where(points[:, 2] < middle, 1.0, 0.0)}
+    )
+    density = (stretch**2 + 2 / stretch - 3) / 2
+    assert made.energies(30.0) == {"neo_hooke": pytest.approx(volume * density * 0.025, rel=1e-12)}
+    found = made.evaluate(np.array([[1.0, 1, middle - 0.1], [1, 1, middle + 0.1]]), 30.0)["von_mises"]
+    assert found == pytest.approx(np.array([0.04, 0.01]) * (stretch**2 - 1 / stretch), rel=1e-9)
+
+
 def test_an_energy_that_varies_is_integrated() -> None:
     """With ``u = b x^2`` along x, J = 1 + 2 b x, and a penalty ``K/2 (J - 1)^2`` integrates to ``2 K b^2 X^2 / 3`` per volume."""
     b, bulk = 0.01, 10.0

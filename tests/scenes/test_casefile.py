@@ -29,7 +29,7 @@ MUSCLE_KEYS = [
     "negative_control",
     "proves",
 ]
-MUSCLE_KEYS += ["quick", "reference", "title", "uncertain", "unsolved"]
+MUSCLE_KEYS += ["quick", "reference", "region", "title", "uncertain", "unsolved"]
 # Solvers check their own settings.
 OPTIONAL = ("interval", "newton_iterations", "stretch", "statistic", 'frame = "any"')
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
@@ -161,7 +161,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "box, capsule, cylinder, distance_error, distance_rounding, half_space, motion, name, sphere, surface, unit",
         ),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, tendon, vertices, within"),
-        ("[[effect]]\n", "effect[0].colour", "mu"),
+        ("[[effect]]\n", "effect[0].colour", "in, mu"),
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, flux, start"),
         ("[frames]\n", "frames.colour", "every, first, interval, last"),
         ("[[expect]]\n", "expect[0].colour", "because, frame, kind, metric, of, statistic, truth, within"),

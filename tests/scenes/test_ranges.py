@@ -22,7 +22,7 @@ def test_an_effect_states_its_ranges_and_a_case_its_own_in_their_place(bar: Path
     own = casefile.read(bar, changes={"uncertain": [MU, bulk]})
     assert list(ranges.ranges(own)) == ["effect[0].mu", "effect[1].bulk"]
     assert ranges.ends(own, key, ranges.ranges(own)[key], "here") == pytest.approx((0.02, 0.04))
-    assert own.key == case.key, "what nobody knows changes no solution"
+    assert own.key == case.key, "ranges change no solution"
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_another_way_to_write_a_key_is_no_other_key(bar: Path, again: str) -> No
     ["attachment[0].within", "bone[1].motion.keyframes[1].angle", "muscle.tet_size", "frames.interval"],
 )
 def test_what_runs_are_measured_with_is_not_varied(bar: Path, key: str) -> None:
-    message = f'uncertain[0].key: got "{key}", want a number of an effect, or the stiffness of an attachment'
+    message = f'uncertain[0].key: got "{key}", want a number of an effect, the stiffness or outline.shift.by of'
     refused(bar, "uncertain", [MU | {"key": key}], message)
 
 

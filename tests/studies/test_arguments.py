@@ -131,3 +131,18 @@ def test_a_solution_is_of_the_body_that_was_solved() -> None:
     assert not arguments.is_of_body(replace(run, body=None), body)
     with pytest.raises(fr.InputError, match="reference: got a solution of another body"):
         arguments.is_of_body(run, replace(body))
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ({"case": "bar"}, "case: got str 'bar', want a Case"),
+        ({"fit": "effect[0].mu"}, r"fit: got str 'effect\[0\].mu', want a list of keys"),
+        ({"fit": [0]}, r"fit: got .*, want a list of keys"),
+        ({"data": 3}, "data: got int 3, want a path"),
+    ],
+)
+def test_what_a_fit_does_not_want_is_refused_by_name(tmp_path, what: dict[str, object], message: str) -> None:
+    given = {"case": fr.load_case(small.write(tmp_path / "bar")), "data": "data.csv", "fit": ["effect[0].mu"]} | what
+    with pytest.raises(fr.InputError, match=message):
+        fr.calibrate(**given)

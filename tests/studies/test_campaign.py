@@ -1,11 +1,13 @@
 """Campaigns: a point is the same alone, among workers and after a kill; a worker that dies loses nothing but time."""
 
 import json
+import multiprocessing
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +63,47 @@ def test_a_worker_that_dies_loses_nothing(tmp_path) -> None:
     alone = carry_out(trials, tmp_path / "alone", Workers())
     for one, other in zip(made, alone, strict=True):
         assert abs(one.run.positions - other.run.positions).max() == 0
+
+
+def sleep(flag: Path) -> None:
+    """What a worker is in that does not end by itself."""
+    flag.touch()
+    time.sleep(120)
+
+
+@dataclass(frozen=True)
+class Endless(Trial):
+    """A trial that the worker that it is sent to sleeps over."""
+
+    flag: Path = Path()
+
+    def __reduce__(self):
+        return sleep, (self.flag,)
+
+
+class StoppedError(Exception):
+    """What a signal to stop raises here."""
+
+
+def test_a_stop_does_not_wait_for_what_workers_are_in(tmp_path) -> None:
+    def stop(*_: object) -> None:
+        raise StoppedError
+
+    def once_inside() -> None:
+        while not (tmp_path / "inside").exists():
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    endless = Endless(scene_in(tmp_path), SolverChoice(solver="pbd", **PBD), "pbd", flag=tmp_path / "inside")
+    before, begin = signal.signal(signal.SIGTERM, stop), time.monotonic()
+    try:
+        threading.Thread(target=once_inside, daemon=True).start()
+        with pytest.raises(StoppedError):
+            carry_out([endless], tmp_path / "runs", Workers(2))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert time.monotonic() - begin < 60, "half of what the worker would sleep"
+    assert not multiprocessing.active_children()
 
 
 def test_bad_settings_are_one_trial_that_failed(tmp_path) -> None:

@@ -1,5 +1,6 @@
 """Points of a study: the worst frame speaks, and the truth is no point of its own study."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,7 +8,9 @@ import numpy as np
 import pytest
 import shapes
 import small
+import studied
 
+from fem_reference.assessment.cost_study import FEATURES, CaseStudy, facts
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
@@ -83,3 +86,19 @@ def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> 
     path.write_text("[]")
     with pytest.raises(InputError, match=rf"{path}: got \[\], want a study as the verb study writes it"):
         cost.stored(tmp_path)
+
+
+def test_studies_of_one_case_against_the_same_truth_are_one(tmp_path: Path) -> None:
+    """The study of the case's own name counts where both have a point; one of a case that was changed since adds nothing."""
+
+    def store(name: str, motion: float, *points) -> None:
+        of = CaseStudy("hip", "Hip", "its reference", points, {studied.ERROR: "mm"}, {}, (), 100, 1.0)
+        path = tmp_path / name / "study.json"
+        path.parent.mkdir()
+        path.write_text(json.dumps(facts(replace(of, features=dict.fromkeys(FEATURES, 1.0) | {"motion": motion}), {})))
+
+    store("hip", 2.0, studied.point(3.0, 1.0))
+    store("hip-a", 2.0, studied.point(3.5, 1.0), studied.point(1.0, 2.0, "relax"))
+    store("hip-b", 4.0, studied.point(0.1, 2.0, "changed"))
+    (found,) = cost.stored(tmp_path)
+    assert [(point.solver, point.errors[studied.ERROR]) for point in found.points] == [("pbd", 3.0), ("relax", 1.0)]

@@ -2,6 +2,9 @@
 
 import json
 import math
+import shlex
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -124,6 +127,17 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     assert "Yours" in html
 
 
+def test_a_command_stands_in_the_same_table(case) -> None:
+    own = Path(__file__).parents[2] / "examples" / "own_command" / "relax.py"
+    words = f"{shlex.quote(sys.executable)} {shlex.quote(str(own))} --iterations {{iterations}} {{scene}} {{out}}"
+    status, facts, html = page(case, "--solver-command", words)
+    assert status == cli.DONE
+    mine = facts["results"][-1]
+    assert (mine["kind"], mine["name"], mine["solver"]) == ("Yours", "relax", "command")
+    assert mine["seconds_per_frame"] > 0
+    assert "relax" in html
+
+
 def test_a_scene_that_is_not_there_is_left_out_and_reported(case, capsys) -> None:
     (case / "bar.vtp").unlink()
     made = table_5_1.stand([casefile.read_muscle(case)], case.parent, {})
@@ -158,7 +172,7 @@ def test_a_foreign_solver_that_cannot_stand_is_bad_input(case, words, place, cap
 
 def test_other_pages_have_no_candidates(capsys) -> None:
     assert cli.main(["page", "octave-examples", "--case", "rod", "--quiet"]) == cli.BAD_INPUT
-    assert "page: got --case, --candidate or --unit for octave-examples" in capsys.readouterr().err
+    assert "page: got --case, --candidate, --unit or --solver-command for octave-examples" in capsys.readouterr().err
 
 
 def table(*found: SolverResult) -> Table:

@@ -1,8 +1,11 @@
 """The calls that the package offers to Python, from a case to a page, and for a body."""
 
+import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import small
@@ -27,6 +30,33 @@ def test_a_case_goes_from_its_file_to_a_page(tmp_path) -> None:
     assert np.abs(mine.positions - reference.positions).max() == 0
     with pytest.raises(fr.InputError, match="a reference that carries the fibres"):
         fr.compare(case, mine, [reference])
+
+
+@pytest.mark.slow
+def test_a_function_is_a_solver(tmp_path) -> None:
+    """It runs in another process, with its settings; another function, or another setting, is another run."""
+    case = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})
+    store, process = tmp_path / "runs", os.getpid()
+
+    def moved(scene: Path, out: Path, *, far: float) -> None:
+        assert os.getpid() != process
+        rest = meshio.read(scene / "muscle.ply")
+        for frame in json.loads((scene / "scene.json").read_text())["frames"]:
+            meshio.Mesh(rest.points + [0, 0, far * frame], rest.cells).write(out / f"{frame}.ply")
+
+    def failing(scene: Path, out: Path) -> None:
+        raise ArithmeticError(f"{scene.name} has no {out.name}")
+
+    run = fr.solve(case, moved, store=store, far=0.5)
+    assert (run.name, run.outcome.status) == ("moved", "converged")
+    assert run.positions[-1] - run.positions[0] == pytest.approx(np.broadcast_to([0, 0, 10.0], run.positions[0].shape))
+    assert fr.solve(case, moved, store=store, far=0.5).folder == run.folder
+    assert fr.solve(case, moved, store=store, far=0.25).folder != run.folder
+    failed = fr.solve(case, failing, store=store)
+    assert failed.outcome.status == "crashed"
+    assert "ArithmeticError: scene has no out" in failed.outcome.message
+    with pytest.raises(fr.InputError, match="the name of a solver, a function, or None"):
+        fr.solve(case, 3, store=store)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import io
 import re
 from contextlib import redirect_stderr
 from pathlib import Path
+from typing import Any
 
 from fem_reference.io.formats import Format
 from fem_reference.io.soup import Soup, of_meshio
@@ -30,12 +31,17 @@ class _Ending(io.BufferedReader):
 
 def _read(path: Path) -> Soup:
     """The triangles of a mesh; points and line cells are passed over."""
+    mesh = read_mesh(path)
+    return of_meshio(mesh.points, mesh.cells)
+
+
+def read_mesh(path: Path) -> Any:
+    """The mesh as meshio has it."""
     from meshio.gmsh.main import read_buffer
 
     _check_declared(path.read_bytes())
     with redirect_stderr(io.StringIO()), _Ending(io.FileIO(path)) as file:  # meshio prints what it skips
-        mesh = read_buffer(file)
-    return of_meshio(mesh.points, mesh.cells)
+        return read_buffer(file)
 
 
 def _check_declared(data: bytes) -> None:

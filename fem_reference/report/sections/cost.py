@@ -1,5 +1,6 @@
 """Costs of every run, and of the reference frame by frame."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.fronts import LOAD, LOADED
 from fem_reference.report.drawings import REFERENCE, Drawing, drawn
-from fem_reference.report.words import words
+from fem_reference.report.words import under_load, words
 from fem_reference.runs.store import Run
 
 # Scalars of a run that a frame took, and their words.
@@ -25,7 +27,9 @@ def facts(comparison: Comparison) -> dict[str, Any]:
     """The kinds of cost, and the cost of each frame of the reference."""
     reference = comparison.reference
     by_frame = {title: reference.scalars[name] for name, title in _BY_FRAME.items() if name in reference.scalars}
-    return {"costs": _costs(comparison), "by_frame": by_frame, "frame_costs": _drawn(reference)}
+    loads = (run.outcome.cost.get(LOAD, math.nan) for run in comparison.runs)
+    found = {"costs": _costs(comparison), "by_frame": by_frame, "frame_costs": _drawn(reference)}
+    return found | {"load": under_load(loads, LOADED)}
 
 
 def _drawn(reference: Run) -> Drawing | None:

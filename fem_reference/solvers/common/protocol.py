@@ -60,6 +60,10 @@ class Solver[P, S: Record]:
     table: tuple[TableRow, ...] = ()
     go_on: GoOn[P, S] | None = None
 
+    def record(self, given: Mapping[str, Any], place: str) -> type[S]:  # noqa: ARG002
+        """The record of settings that are ``given`` at a ``place``: always the same, unless they say which ones there are."""
+        return self.settings
+
     def fills(self, settings: S) -> bool:  # noqa: ARG002
         """True where it needs a meshed problem."""
         return True
@@ -84,6 +88,10 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
     fibres: Callable[[S], bool] = lambda _: False
+
+    def moved(self, settings: S) -> Moves:  # noqa: ARG002
+        """The carrier of its unknowns under such settings."""
+        return self.moves
 
     def fills(self, settings: S) -> bool:
         """True where it needs the muscle filled with tetrahedra and fibres."""

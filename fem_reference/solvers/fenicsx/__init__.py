@@ -137,7 +137,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
     assert frame.state is not None  # of a muscle
-    results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions)
+    results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions, problem.regions)
     own = pulls | _attachment_errors(problem, frame) | stress_scalars(results, frame.number)
     return replace(frame, note=note, scalars=scalars | own)
 

@@ -34,6 +34,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability
 from fem_reference.solvers.fenicsx.system import System
+from fem_reference.solvers.fenicsx.touching import touching_of
 from fem_reference.solvers.fenicsx.validity import Validity
 
 
@@ -62,19 +63,19 @@ class AssembledBody:
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.conditions, self.spent)
-        symmetric = not any(isinstance(effect, Load) for effect in body.effects)  # all others have an energy
-        self.linear = _linear_solver(self.system, symmetric, settings)
+        self.linear = _linear_solver(self.system, body, settings)
         self.newton = Newton(self.system, self.linear, self.determinants, settings)
         counts = isinstance(self.linear, Factorised) and self.linear.symmetric
         self.stability = Stability(self.system, cast(Factorised, self.linear)) if counts else None
         self.contact = self.system.contact = self._contact(body, body.contact, form) if body.contact else None
+        self.touching = self.system.touching = touching_of(body, form, self.displacement, self.spent)
         self.system.balance_units()
         in_situ.balance(form, self.system, self.linear, settings.residual)
         self.path = Path(self.system, self.determinants)
         if form.rest is not None:
             self.path.settle(self.energy(), connected=False)
-        inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, self
-        self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
+        contacts = (one for one in (self.contact, self.touching) if one is not None)
+        self.checks: tuple[StateCheck, ...] = *contacts, self.determinants, self.validity, self.path, self
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
@@ -234,6 +235,7 @@ class AssembledBody:
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energies [N mm]."""
         contact = self.contact.scalars() if self.contact else {}
+        contact |= self.touching.scalars() if self.touching else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
         gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
         own = {
@@ -286,11 +288,12 @@ class AssembledBody:
         return result
 
 
-def _linear_solver(system: System, symmetric: bool, settings: BodySettings) -> LinearSolver:
+def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # the type that the stubs declare
+    symmetric = all(one.stored for one in body.effects if isinstance(one, Load))  # all others have an energy
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
+        system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it
         return Multigrid(system)
     precision = settings.precision or ("double" if kind == "direct" else "single")
     return Factorised(system.matrix, symmetric, kind == "lagged", precision, system.spent)

@@ -1,15 +1,9 @@
 """Compilation of forms for this machine: one process at a time compiles a form, and removes incomplete files of it before."""
 
-import hashlib
-import os
-import platform
 import signal
-import subprocess
-import sysconfig
-import tempfile
 from collections.abc import Callable
 from ctypes import CDLL
-from functools import cache, wraps
+from functools import wraps
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -23,18 +17,9 @@ from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
+from fem_reference.foundations import native
+
 _LOCKS = 64  # shared by the forms
-
-
-@cache
-def machine() -> str:
-    """The kind of this processor, as a hash: code compiled for one kind need not run on another."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        known = next(line for line in lines if line.startswith(("flags", "Features")))
-    except (OSError, StopIteration):
-        known = platform.processor()
-    return hashlib.sha256(f"{platform.machine()} {known}".encode()).hexdigest()[:12]
 
 
 # All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that nothing is NaN, but NaN
@@ -42,7 +27,7 @@ def machine() -> str:
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
 FLAGS += ["-fassociative-math", "-freciprocal-math"]
 # FFCx stores compiled forms under their content and these options, the machine among them.
-OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"]}
+OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={native.machine()}"]}
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
@@ -114,21 +99,8 @@ class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no type
 
 def library(source: Path, sizes: dict[str, int]) -> CDLL:
     """The functions of a C file, compiled with ``sizes`` and kept beside FFCx's compiled forms."""
-    words = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
-    compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
-    key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *words, machine()]).encode())
-    folder = Path(jit.get_options()["cache_dir"])
-    kept = folder / f"fem_reference_{source.stem}_{key.hexdigest()[:16]}.so"
-    if not kept.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as new:
-            made = Path(new) / kept.name
-            command = [*compiler, *words, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made)]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            if done.returncode:
-                raise RuntimeError(f"{command[0]} cannot compile {source}: {done.stderr.strip()}")
-            made.replace(kept)  # atomic, also where several processes compile it
-    return CDLL(str(kept))
+    flags = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
+    return native.library(source, flags, Path(jit.get_options()["cache_dir"]))
 
 
 def prepare() -> None:

@@ -14,10 +14,11 @@ from dolfinx import fem, mesh
 from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
-from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, regions_named, total_energy
 from fem_reference.foundations.material_point import Functions
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Body
+from fem_reference.geometry.regions import INWARDS
+from fem_reference.problems.body import Body, reference_nodes
 from fem_reference.solvers.fenicsx import compiling, meshes
 from fem_reference.solvers.fenicsx.meshes import DEGREE, geometry, rule
 from fem_reference.solvers.fenicsx.rest_stress import rest_stress
@@ -67,12 +68,14 @@ class Form:
         acting = list(zip(effects, self.amounts, strict=True))
         self.step = _step(effects, unknowns.function_space)
         state, variables = _state(unknowns, self._fibre(body, cells), self.step)
+        state = replace(state, regions=self._regions(body, cells))
         self.determinant = state.J
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         self.rest = rest_stress(unknowns, body.effects)
         at_rest = 0 if self.rest is None else self.rest.energy(state)
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
-        self.energy = (total_energy(stored, state) + at_rest) * self.dx
+        stretched = self._stretched(acting, body, state)
+        self.energy = (total_energy(stored, state) + at_rest) * self.dx + stretched
         self.kinetic: Any = 0
         if self.step is not None and (velocity := self.step.velocity) is not None:
             moving: list[Any] = [effect for effect in effects if "momentum" in effect.needs]
@@ -87,7 +90,7 @@ class Form:
         }
         self._isotropic = None if self.rest is None else self._derivatives(self.rest.isotropic(state), variables)
         self.set_amounts(body.frames[0])
-        self.loads = self._loads(acting, state, unknowns)
+        self.loads = self._loads(acting, state, unknowns) + (ufl.derivative(stretched, unknowns) if stretched else 0)
 
     def set_amounts(self, frame: float) -> None:
         """Set the amounts of effects at a frame, and the derivatives of effects that are not zero over whole frames there."""
@@ -113,10 +116,20 @@ class Form:
         first, second = _differentiated(energy, by, self.kinds)
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
+    def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
+        """The energy of what is stretched on the surface, 0 without; shares in regions are linear between the vertices."""
+        stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
+        shares: dict[str, Any] = {}
+        for name in regions_named(stored):
+            share = shares[name] = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)))
+            share.x.array[:] = body.regions[name](share.function_space.tabulate_dof_coordinates())
+        at, normal = replace(state, regions=shares), list(ufl.FacetNormal(self.mesh))
+        return sum(effect.potential(at, normal) * self.measure(effect.on) for effect in stored)
+
     def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
         test, loads = ufl.TestFunction(unknowns.function_space), 0
         for effect, amount in acting:
-            if isinstance(effect, Load):
+            if isinstance(effect, Load) and not effect.stored:
                 traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(self.mesh)))
                 work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
                 loads -= work * self.measure(effect.on)
@@ -130,14 +143,31 @@ class Form:
         """The fibre direction at the quadrature points, where an effect needs it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
-        points, weights = self.rule
-        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), points=points, weights=weights)
-        function = fem.Function(fem.functionspace(self.mesh, element))
-        places = geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
-        directions = body.fibre(np.repeat(cells, len(points)), places)
-        function.x.array[: directions.size] = directions.ravel()
-        function.x.scatter_forward()
+        directions = body.fibre(np.repeat(cells, len(self.rule[0])), self._places(self.rule[0], cells))
+        function = self._known(body, directions)
         return [function[i] for i in range(3)]
+
+    def _regions(self, body: Body, cells: Ints) -> dict[str, Any]:
+        """The shares of the quadrature points in the regions in which effects act."""
+        if not regions_named(body.effects):
+            return {}
+        points, corners = self.rule[0], reference_nodes(body.mesh.kind, 1)
+        within = points + INWARDS * (corners.mean(axis=0) - points)
+        return {name: self._known(body, share) for name, share in body.shares(self._places(within, cells)).items()}
+
+    def _places(self, points: Floats, cells: Ints) -> Floats:
+        """The places (n, 3) [mm] at rest of reference ``points`` (q, 3) in all cells."""
+        return geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
+
+    def _known(self, body: Body, values: Floats) -> fem.Function:
+        """A function with ``values`` (n, ...) at the quadrature points."""
+        points, weights = self.rule
+        shape = values.shape[1:]
+        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=shape, points=points, weights=weights)
+        function = fem.Function(fem.functionspace(self.mesh, element))
+        function.x.array[: values.size] = values.ravel()
+        function.x.scatter_forward()
+        return function
 
 
 @dataclass(frozen=True, eq=False)

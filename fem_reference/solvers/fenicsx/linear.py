@@ -59,14 +59,13 @@ class Factorised:
         self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
 
     def _choose(self, precision: str) -> None:
-        self.precision = precision
+        self.precision, self.entries = precision, self.matrix.getInfo()["nz_used"]
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)  # type: ignore[arg-type]  # as its stubs declare it
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
         self.preconditioner = self.krylov.getPC()
         self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
         self.preconditioner.setFactorSolverType("mumps")
-        # Read at its first factorisation.
-        PETSc.Options().setValue(f"{self.krylov.getOptionsPrefix()}pc_precision", precision)
         self.krylov.setFromOptions()
         self.preconditioner.setFactorSetUpSolverType()
         self.factors = self.preconditioner.getFactorMatrix()
@@ -92,10 +91,16 @@ class Factorised:
 
     def factorise(self) -> None:
         """Factorise the present matrix; ``LinearSolveError`` where this fails."""
+        if self.entries != self.matrix.getInfo()["nz_used"]:  # of a matrix that has grown the factors are others
+            self._choose(self.precision)
+        options = PETSc.Options(self.krylov.getOptionsPrefix())
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
+            # Read here alone; PETSc warns at its end of an option that nothing has read.
+            options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
+            options.delValue("pc_precision")
             self.preconditioner.setReusePreconditioner(True)
         self.spent.counts["factorisations"] += 1
         if self.factors.getMumpsInfog(_ERROR) < 0:

@@ -9,6 +9,7 @@ from pathlib import Path
 import cloudpickle
 import numpy as np
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.subprocesses import scratch_folder
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import check
@@ -38,6 +39,10 @@ class Session:
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
         """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
         check(body, settings.element, settings.quadrature_degree)
+        if body.touching and self.ranks > 1:
+            raise InputError("ranks", self.ranks, "1, on which parts of the surface may touch")
+        if body.touching and settings.linear_solver == "multigrid":
+            raise InputError("linear_solver", '"multigrid"', "another, as its levels know no parts that touch")
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:

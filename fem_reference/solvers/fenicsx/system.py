@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
 from fem_reference.solvers.fenicsx.contact import ContactForces, Tractions
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.touching import TouchingForces
 
 _ROUNDING = 1e-11  # [mm] of positions
 
@@ -39,31 +40,53 @@ class System:
         for one in conditions:
             self.fixed[one.exact] = True
         self.cells = CellSums(form)
-        structure = self.structure = self.cells.structure()
-        self.tangent = Tangent(np.zeros(len(structure.columns) + 1), self.cells.places(structure, self.fixed))
         self.scale = np.ones(self.size)  # of the unknowns of linear systems
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
-        self._make_matrix(structure)
         self.ties = [one for one in conditions if isinstance(one, PointSprings)]
         springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
         self.loads, self.springs = (
-            [SurfaceSums(terms, unknowns, structure, self.fixed)] if terms else [] for terms in (form.loads, springs)
+            [SurfaceSums(terms, unknowns, self.fixed)] if terms else [] for terms in (form.loads, springs)
         )
         self.contact: ContactForces | None = None
+        self.touching: TouchingForces | None = None
+        self.matrix, whole = PETSc.Mat().create(space.mesh.comm), self.index_map.size_global * self.block
+        self.matrix.setSizes(((self.owned, whole), (self.owned, whole)))
+        self.matrix.setType(PETSc.Mat.Type.AIJ)
+        self._use(self.cells.structure(), 1.0)
 
-    def _make_matrix(self, structure: Structure) -> None:
-        """A matrix that takes the entries of the tangent; those of ghost rows go to the ranks that own them."""
+    def _use(self, structure: Structure, unit: float) -> None:
+        """Have tangent and matrix take the entries of a ``structure``; those of ghost rows go to the ranks that own them."""
         blocks = self.index_map.local_to_global(np.arange(self.size // self.block, dtype=np.int32))
         names = (blocks[:, None] * self.block + np.arange(self.block)).ravel().astype(PETSc.IntType)
         rows = np.repeat(np.arange(self.size), np.diff(structure.starts))
-        whole = self.index_map.size_global * self.block
-        self.matrix = PETSc.Mat().create(self.unknowns.function_space.mesh.comm)
-        self.matrix.setSizes(((self.owned, whole), (self.owned, whole)))
-        self.matrix.setType(PETSc.Mat.Type.AIJ)
+        self.structure = structure
+        self.tangent = Tangent(np.zeros(len(rows) + 1), self.cells.places(structure, self.fixed), unit)
         self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
         diagonal = np.flatnonzero(structure.columns == rows)
         own = np.flatnonzero(self.fixed[: self.owned])
         self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
+        for terms in self.springs + self.loads:
+            terms.find_places(self._keys())
+
+    def _keys(self) -> Ints:
+        """The sorted rows times the size plus columns (e,) of the structure."""
+        return np.repeat(np.arange(self.size), np.diff(self.structure.starts)) * self.size + self.structure.columns
+
+    def _add_touching(self, touching: TouchingForces) -> None:
+        """Add the tangent of ``touching`` to the entries, after those that it lacks were added to the structure."""
+        found, own = touching.tangent().tocoo(), self._keys()
+        free = ~(self.fixed[found.row] | self.fixed[found.col])
+        keys = found.row[free].astype(np.int64) * self.size + found.col[free]
+        places = np.searchsorted(own, keys)
+        lacks = own[np.minimum(places, len(own) - 1)] != keys
+        if lacks.any():
+            entries, every = self.tangent.entries, np.insert(own, places[lacks], keys[lacks])
+            rows, columns = np.divmod(every, self.size)
+            starts = np.searchsorted(rows, np.arange(self.size + 1))
+            self._use(Structure(starts.astype(np.int32), columns.astype(np.int32)), self.tangent.unit)
+            self.tangent.entries[np.append(np.searchsorted(every, own), -1)] = entries
+            places = np.searchsorted(every, keys)
+        self.tangent.entries[places] += found.data[free]
 
     def residual(self, tractions: Tractions | None = None) -> float:
         """Sum the residual into ``b`` and return its norm; contact ``tractions`` other than the present ones may be given."""
@@ -79,16 +102,17 @@ class System:
         first order. ``pointwise``: see ``cells``.
         """
         with self.spent.on("assembly"):
-            entries = self.tangent.entries
-            self.work.array[:], entries[:] = 0, 0
+            self.work.array[:], self.tangent.entries[:] = 0, 0
             self.cells.add(self.work.array, self.tangent, moves, pointwise=pointwise)
             for terms in self.springs + self.loads:
-                terms.add_tangent(entries)
+                terms.add_tangent(self.tangent.entries)
             ties = [tie.tangent() for tie in self.ties]
             for points in [*ties, *(self.contact.tangent() if self.contact else ())]:
                 self.cells.add_points(self.tangent, *points)
-            entries[self.prescribed_diagonal] = 1.0
-            self.matrix.setValuesCOO(entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
+            if self.touching:
+                self._add_touching(self.touching)
+            self.tangent.entries[self.prescribed_diagonal] = 1.0
+            self.matrix.setValuesCOO(self.tangent.entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
@@ -99,6 +123,8 @@ class System:
             tie.add_residual(self.work.array, moves)
         if self.contact:
             self.contact.add_residual(self.work.array, tractions)
+        if self.touching:
+            self.touching.add_residual(self.work.array, moves)
         self.work.scatter_reverse(la.InsertMode.add)
         self.b.array[:] = np.where(self.fixed[: self.owned], 0.0, self.work.array[: self.owned])
         norm = float(self.b.norm())
@@ -147,22 +173,26 @@ class System:
             load.add_residual(self.work.array, None)
         if self.contact and not inside:
             self.contact.add_residual(self.work.array, None)
+        if self.touching and not inside:
+            self.touching.add_residual(self.work.array, None)
         self.work.scatter_reverse(la.InsertMode.add)
         return np.array(self.work.array)
 
 
 class SurfaceSums:
-    """Terms of the weak form on parts of the surface, with their tangent in the entries of a ``structure``."""
+    """Terms of the weak form on parts of the surface, with their tangent in the entries of a structure."""
 
-    def __init__(self, terms: Any, unknowns: fem.Function, structure: Structure, fixed: NDArray[np.bool_]) -> None:
+    def __init__(self, terms: Any, unknowns: fem.Function, fixed: NDArray[np.bool_]) -> None:
         step = ufl.TrialFunction(unknowns.function_space)
         self.residual, self.slope = compiling.form(terms), compiling.form(ufl.derivative(terms, unknowns, step))
         self.matrix = fem.create_matrix(self.slope)
-        size = len(fixed)
-        rows = np.repeat(np.arange(size), np.diff(self.matrix.indptr))
-        keys = np.repeat(np.arange(size), np.diff(structure.starts)) * size + structure.columns
-        self.places = np.searchsorted(keys, rows * size + self.matrix.indices)
-        self.places[fixed[rows] | fixed[self.matrix.indices]] = len(keys)
+        self.fixed = fixed
+
+    def find_places(self, keys: Ints) -> None:
+        """Find the places of the tangent among entries with the sorted ``keys`` (e,), each row times the size plus column."""
+        rows, columns = np.repeat(np.arange(len(self.fixed)), np.diff(self.matrix.indptr)), self.matrix.indices
+        self.places = np.searchsorted(keys, rows * len(self.fixed) + columns)
+        self.places[self.fixed[rows] | self.fixed[columns]] = len(keys)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the terms to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
@@ -192,6 +222,7 @@ def reactions(
             shared[one.dofs] += 1
     found = {one.entry.name: one.force(residual, now, shared) for one in system.conditions}
     found |= contact.forces() if contact else {}
+    found |= system.touching.forces() if system.touching else {}
     forces = {name: comm.allreduce(force, MPI.SUM) for name, (force, _) in found.items()}
     moments = {name: comm.allreduce(moment, MPI.SUM) for name, (_, moment) in found.items()}
     return forces, moments

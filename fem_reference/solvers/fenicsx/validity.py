@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
-from fem_reference.effects import name_of
+from fem_reference.effects import Effect, State, name_of, region_of
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
@@ -84,6 +84,7 @@ class Validity:
             stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
+        self.here = State(F=(), regions=body.shares(self.centres))
 
     def volume_ratio(self) -> float:
         """The present volume of the body over its rest volume."""
@@ -109,16 +110,22 @@ class Validity:
         found: list[Outside] = []
         outside = np.zeros(len(self.cells), bool)
         acting = [effect for effect in self.effects if effect.amount(frame) != 0]
-        limits = [(name_of(effect), limit) for effect in acting for limit in effect.limits()]
+        limits = [(effect, limit) for effect in acting for limit in effect.limits()]
         for measure in self.values:
             means = self._means(measure)
             low, high = self._extreme(means), self._extreme(means, -1.0)
             scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
-            for law, limit in [one for one in limits if one[1].measure == measure]:
-                outside |= (means < limit.low) | (means > limit.high)
-                found += [Outside(law, limit, low)] if low.value < limit.low else []
-                found += [Outside(law, limit, high)] if high.value > limit.high else []
+            for effect, limit in [one for one in limits if one[1].measure == measure]:
+                there = np.where(self._acts(effect), means, np.clip(means, limit.low, limit.high))
+                outside |= (there < limit.low) | (there > limit.high)
+                low, high = self._extreme(there), self._extreme(there, -1.0)
+                found += [Outside(name_of(effect), limit, low)] if low.value < limit.low else []
+                found += [Outside(name_of(effect), limit, high)] if high.value > limit.high else []
         return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
+
+    def _acts(self, effect: Effect) -> Any:
+        """True in cells whose middle an ``effect`` has most of: (n,), or one for all."""
+        return self.here.share(region_of(effect)) > 1 / 2
 
     def _means(self, measure: str) -> Floats:
         """The means over the cells of this rank (n,)."""

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from scipy.sparse.linalg import splu
 
-from fem_reference.effects import in_situ
+from fem_reference.effects import Load, in_situ
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
@@ -46,11 +46,11 @@ class ScikitBodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
 
 
-def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
-    """The states of ``body`` at its frames, as far as they can be reached."""
-    check(body, settings.element, settings.quadrature_degree)
-    if body.contact is not None:
-        raise InputError("contact", "bones", "a body without, as this solver knows no contact")
+def _check_known(body: Body) -> None:
+    """Raise InputError where a body has a part that this solver knows nothing of."""
+    if body.contact is not None or body.touching:
+        name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
+        raise InputError(name, got, "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
         want = "springs on facets, as this solver knows no others"
         raise InputError("prescribed", "springs at points of a skin", want)
@@ -62,6 +62,14 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     if in_situ.among(body.effects) is not None:
         want = "effects that leave the body at rest, as this solver balances no tension there"
         raise InputError("effects", "in_situ", want)
+    if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
+        raise InputError("effects", "membrane", "effects without: this solver has no energy of a surface")
+
+
+def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
+    """The states of ``body`` at its frames, as far as they can be reached."""
+    check(body, settings.element, settings.quadrature_degree)
+    _check_known(body)
     begin = time.perf_counter()
     march_of = March(body, settings)
     sink(march_of.state(Step(body.frames[0])))

@@ -81,7 +81,7 @@ class Equations:
     def energy(self, unknowns: Floats, frame: float) -> float:
         """The energy [N mm]."""
         values = np.moveaxis(self.inside.variables(unknowns), -1, 0)
-        energy = total_energy(self._acting(frame), _state(list(values), self.inside.fibre))
+        energy = total_energy(self._acting(frame), self._at(self.inside, list(values), self.inside.fibre))
         stabilising = 0.0 if self.stabilising is None else unknowns @ (self.stabilising @ unknowns) / 2
         return float((energy * self.inside.weights).sum() - stabilising)
 
@@ -113,7 +113,8 @@ class Equations:
         deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
         jets = variables(deformed[:, None])
         fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
-        energy = total_energy([(effect, 1.0) for effect in self.body.effects], _state(jets, fibre))
+        everywhere = replace(_state(jets, fibre), regions=dict.fromkeys(self.body.regions, 0.5))
+        energy = total_energy([(effect, 1.0) for effect in self.body.effects], everywhere)
         felt = list(range(9)) + ([] if self.space.pressure is None else [PRESSURE])
         if not isinstance(energy, Jet):
             return felt
@@ -122,8 +123,14 @@ class Equations:
 
     def _energy_law(self, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
         fibre = None if points.fibre is None else points.fibre.reshape(-1, 3)
-        energy = _jet(total_energy(self._acting(frame), _state(jets, fibre)), jets[0])
+        energy = _jet(total_energy(self._acting(frame), self._at(points, jets, fibre)), jets[0])
         return energy.slope, energy.curvature
+
+    def _at(self, points: Points, entries: list[Any], fibre: Floats | None) -> State:
+        """The state of ``points``, with the shares that they have in regions in the shape of their ``fibre`` or in one row."""
+        shares = self.body.shares(points.places.reshape(-1, 3))
+        shape = np.shape(entries[0]) if isinstance(entries[0], np.ndarray) else (-1,)
+        return replace(_state(entries, fibre), regions={name: one.reshape(shape) for name, one in shares.items()})
 
 
 def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tuple[Floats, Floats]:

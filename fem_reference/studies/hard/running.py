@@ -18,11 +18,12 @@ from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress, Verdict
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
-from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.case import Candidate, SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, following
@@ -64,19 +65,30 @@ class Posed:
         return of_case.problem(case, of_case.setup(case))
 
 
-def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
-    """Every solver, or ``only`` these, on each case, the reference first; it also ``in_steps`` and on so many ``jitters``."""
-    begin, cells = time.perf_counter(), list[Cell]()
+def run(
+    hard: Sequence[Hard],
+    only: Sequence[str] = (),
+    own: Sequence[Candidate] = (),
+    *,
+    in_steps: bool = False,
+    jitters: int = 0,
+) -> Stress:
+    """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
+    so many ``jitters``.
+    """
+    begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
+    limit = {"time_limit": f"{LIMIT:g} s"}
+    chosen |= {one.name: SolverChoice(**{"solver": one.solver, **limit, **one.settings}) for one in own}
     with fenicsx.shared():
         for i, one in enumerate(hard):
             posed, place = Posed(one, in_steps=in_steps, jitters=jitters), f"case {i + 1} of {len(hard)}: {one.name}"
             for name, choice in chosen.items():
-                found = cell(posed, one.choice(choice))
+                found = replace(cell(posed, one.choice(choice)), solver=name)
                 log.info("%s, %s: %s: %s", place, name, found.verdict, found.sentence)
                 cells.append(found)
     rows = tuple(HardCase(one.name, one.title, one.healthy, one.bound) for one in hard)
-    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with())
+    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with() | spent_since(clock))
 
 
 def cell(posed: Posed, choice: SolverChoice) -> Cell:
@@ -85,13 +97,15 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
     hard, solver = posed.hard, choice.solver
     try:
         if hard.only and solver not in hard.only:
-            return Cell(hard.name, solver, "refused", f"the case is about {', '.join(hard.only)} only: {hard.because}")
+            return Cell(
+                hard.name, solver, "not applicable", f"the case is about {', '.join(hard.only)} only: {hard.because}"
+            )
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
-            return Cell(hard.name, solver, "refused", "nothing but effects acts, and this solver simulates none")
+            return Cell(hard.name, solver, "not applicable", "nothing but effects acts, and this solver simulates none")
         with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:
-        found = Cell(hard.name, solver, "refused", str(error))
+        found = Cell(hard.name, solver, "not applicable", str(error))
     except _Late:
         found = Cell(hard.name, solver, "failed", "timed out: it took too much processor time", "timed out")
     except StalledError as why:
@@ -154,7 +168,7 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
     begins = followed.least_determinant
     if hard.start is not None and begins is not None and not begins[0] > 0:
         said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {blank.status}"
-        return replace(blank, verdict="refused", sentence=said)
+        return replace(blank, verdict="not applicable", sentence=said)
     if blank.status != "converged":
         return stress.unfinished(blank, message, histories, hard.no_solution)
     return stress.judge(blank, histories, hard.contrast)

@@ -104,3 +104,30 @@ def test_after_a_failure_the_isotropic_body_is_not_summed() -> None:
     with pytest.raises(ArithmeticError, match="singular"):
         failed()
     assert form.derivatives is own
+
+
+def test_a_border_on_faces_of_cells_parts_the_cells() -> None:
+    """Some of the quadrature points are vertices, on the border: each is in the region that its cell is in. Half of a cube has
+    twice the shear modulus, at a shear of its whole: ``mu/2 g^2`` per volume.
+    """
+    laws = tuple(make("neo_hooke", mu=mu, **{"in": at}) for mu, at in ((0.01, "not half"), (0.02, "half")))
+    mesh, half = (
+        shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron"),
+        {"half": lambda points: 1.0 * (points[:, 2] <= 0.5)},
+    )
+    body = Body(mesh, laws, (), (0.0, 1.0), regions=half)
+    built = AssembledBody(body, BodySettings(element="P2", first_step=1.0))
+    built.start(lambda points: points + 0.1 * points[:, [2, 2, 2]] * [1.0, 0.0, 0.0])
+    assert built.energy() == pytest.approx((0.01 + 0.02) / 2 * 0.1**2 / 2, rel=1e-12)
+
+
+def test_the_energy_of_a_membrane_is_that_of_its_part_of_a_face() -> None:
+    """A cube stretched to l along x at constant volume; the membrane has a share of y of the face z1: half of its area."""
+    sheet, stretch = make("membrane", on="z1", thickness=0.1, mu=2.0, **{"in": "fascia"}), 1.2
+    mesh, soft = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron"), make("neo_hooke", mu=0.01)
+    body = Body(mesh, (soft, sheet), (), (0.0, 1.0), regions={"fascia": lambda points: points[:, 1]})
+    built = AssembledBody(body, BodySettings(element="P2", first_step=1.0))
+    built.start(lambda points: points * [stretch, stretch**-0.5, stretch**-0.5])
+    density = (stretch**2 + 2 / stretch - 3) / 2
+    assert built.energy() == pytest.approx((0.01 + 0.1 * 2 / 2) * density, rel=1e-12)
+    assert built.linear.symmetric  # so that its negative modes are counted

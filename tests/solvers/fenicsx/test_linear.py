@@ -25,4 +25,5 @@ def test_signs_that_single_precision_cannot_tell_are_told_by_double(softest: flo
     matrix.assemble()
     linear = Factorised(matrix, symmetric=True, lagged=True, precision="single", spent=Spent())
     assert linear.negative_pivots() == negative
+    assert not PETSc.Options().getAll(), "no option is left that PETSc would warn of, as nothing reads it"
     assert linear.precision == ("double" if abs(softest) < 6e-8 else "single")

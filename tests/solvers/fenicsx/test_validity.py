@@ -10,8 +10,11 @@ from scipy.optimize import brentq, minimize_scalar
 from fem_reference import effects
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.loads import RampPoint
+from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import parse
+from fem_reference.geometry.regions import Around, Blended
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
 from fem_reference.problems.paths import Affine, Along, Rest
@@ -197,13 +200,17 @@ def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
         assert "2 % of the body collapsed" in solved.outcome.message
 
 
+PLANE = Surface(np.array([[-9.0, -9, 0], [19, -9, 0], [-9, 19, 0]]), np.array([[0, 1, 2]]))  # z = 0
+
+
 def drawn(session, acting: tuple[Effect, ...], stretch: float):
     """A block with fibres along x, all of its surface drawn along them without change of volume."""
     across = stretch**-0.5
     gradient = ((stretch - 1, 0.0, 0.0), (0.0, across - 1, 0.0), (0.0, 0.0, across - 1))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0), *acting)
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    body = Body(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)))
+    half = {"half": Blended(Around(PLANE, 0.5), 0.0)}
+    body = Body(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)), regions=half)
     return session.solve(body, BodySettings(element="Q1/P0", first_step=0.25, residual=1e-11))
 
 
@@ -220,10 +227,17 @@ def test_fibres_outside_their_range_are_named(stretch, beyond, session) -> None:
 
 
 def test_only_laws_that_act_have_a_range(session) -> None:
-    resting = ACTIVE.model_copy(update={"ramp": (effects.RampPoint(frame=0, amount=0.0),)})
+    resting = ACTIVE.model_copy(update={"ramp": (RampPoint(frame=0, amount=0.0),)})
     solved = drawn(session, (resting,), 1.8)
     assert solved.last.scalars["outside_law"] == 0
     assert solved.outcome.message == "all 2 frames reached"
+
+
+def test_a_law_has_its_range_where_it_acts(session) -> None:
+    """Of eight cells half are in the region of the law: these are outside its range."""
+    solved = drawn(session, (ACTIVE.model_copy(update={"region": "half"}),), 1.8)
+    assert solved.last.scalars["outside_law"] == 4
+    assert "fibre_active is outside the range" in solved.outcome.message
 
 
 def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:

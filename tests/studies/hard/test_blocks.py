@@ -30,7 +30,7 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
         ):
             blocks.problem(torn)
         found = running.cell(running.Posed(torn), records.choices()["pbd"])
-        assert (found.verdict, "moves otherwise" in found.sentence) == ("refused", True)
+        assert (found.verdict, "moves otherwise" in found.sentence) == ("not applicable", True)
     # Faces that move alike may meet, as may the middle of one.
     alike = (top, top.model_copy(update={"face": "x0"}))
     assert len(blocks.problem(hard.model_copy(update={"hold": alike})).attached) == 2

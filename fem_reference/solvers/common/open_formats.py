@@ -3,19 +3,21 @@
 import csv
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fem_reference.effects import Effect, name_of
+from fem_reference.effects import Effect, name_of, region_of
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
+from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.io import files
 from fem_reference.io.soup import rows
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.problems.setup import Bone
 
 UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
 CONVENTIONS = {
@@ -25,18 +27,20 @@ CONVENTIONS = {
 }
 
 
-def write(case: MuscleCase, problem: MuscleProblem, folder: Path) -> None:
-    """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
+def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
+    """Every file of the export of a ``problem`` but those that explain it, into ``folder``; ``of``: facts that name its case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
         files.write_surface(folder / name, bone.surface, bone.surface.points)
     along = {} if problem.directions is None else {"fibre": problem.directions}
+    middles = problem.mesh.points[problem.mesh.tets].mean(axis=1)
+    along |= {f"region_{name}": region(middles) for name, region in problem.regions.items()}
     for name in ("tets.vtu", "tets.msh"):
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
     write_lines(folder / "fibres.vtk", problem.fibres)
     _write_tables(problem, folder)
-    files.write_text(folder / "scene.json", json.dumps(facts(case, problem), indent=1, allow_nan=False))
+    files.write_text(folder / "scene.json", json.dumps({**of, **facts(problem)}, indent=1, allow_nan=False))
 
 
 def bone_files(problem: MuscleProblem) -> list[str]:
@@ -67,17 +71,16 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
     files.write_text(path, text.getvalue())
 
 
-def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
+def facts(problem: MuscleProblem) -> dict[str, Any]:
+    """The facts that no mesh file has: units, conventions, frames, bones, attachments, names of regions (their shares are in the
+    files of tets), effects with the unit of every parameter.
+    """
     contact = problem.contact
     bones = [
-        entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
-        | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
-        for entry, name, bone in zip(case.bone, bone_files(problem), problem.bones, strict=True)
+        _bone(bone) | {"file": name, "obstacle": contact is not None and contact.is_by(bone.name)}
+        for bone, name in zip(problem.bones, bone_files(problem), strict=True)
     ]
     return {
-        "case": case.name,
-        "title": case.title,
         "written_by": f"fem_reference {__version__}",
         "units": UNITS,
         "conventions": CONVENTIONS,
@@ -88,16 +91,31 @@ def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
             for attached in problem.attached
         ],
+        "regions": list(problem.regions),
         "effects": [_effect(effect) for effect in problem.effects],
         "mesh": problem.mesh_facts,
     }
+
+
+def _bone(bone: Bone) -> dict[str, Any]:
+    """A bone as scene files describe it: its closed form, if it has one, its motion, and the errors of its distance [mm]."""
+    form = {name: asdict(bone.solid) for name, form in CLOSED_FORMS.items() if isinstance(bone.solid, form)}
+    found: dict[str, Any] = {"name": bone.name, **form}
+    if (motion := bone.motion) is not None:
+        turns, frames = motion.centre is not None, [float(frame) for frame in motion.frames]
+        amount = "angle" if turns else "distance"
+        along = {"axis": motion.axis, "centre": motion.centre} if turns else {"direction": motion.axis}
+        pairs = zip(frames, motion.amounts, strict=True)
+        found["motion"] = along | {"keyframes": [{"frame": frame, amount: value} for frame, value in pairs]}
+    return found | {"distance_error": bone.distance_error, "distance_rounding": bone.distance_rounding}
 
 
 def _effect(effect: Effect) -> dict[str, Any]:
     """The name of an effect, its law in words, and its parameters, each with its value and unit."""
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
-    return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters}
+    there = {"in": region} if (region := region_of(effect)) else {}
+    return {"name": name_of(effect), "law": type(effect).__doc__, "parameters": parameters} | there
 
 
 def write_lines(path: Path, lines: Polylines) -> None:

@@ -10,13 +10,15 @@ import meshio
 import numpy as np
 import pytest
 
-from fem_reference.export import open_formats
+from fem_reference.export import febio
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers.common import open_formats
 
 pytestmark = pytest.mark.slow
 
@@ -96,22 +98,43 @@ def test_the_scene_says_units_and_values(exported: Path, built: MuscleProblem) -
 
 def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: MuscleProblem) -> None:
     soft = casefile.read_muscle(scene.folder, changes={"attachment[0].stiffness": "250 kPa/mm"})
-    facts = open_formats.facts(soft, replace(built, attached=muscle.setup(soft).attached))
+    facts = open_formats.facts(replace(built, attached=muscle.setup(soft).attached))
     assert facts["attachments"] == [
         {"name": "origin", "bone": "floor", "stiffness": 0.25, "unit": "MPa/mm"},
         {"name": "insertion", "bone": "lid", "stiffness": None, "unit": "MPa/mm"},
     ]
 
 
-def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: MuscleProblem) -> None:
+def test_bones_that_contact_names_are_obstacles(built: MuscleProblem) -> None:
     contact = parse(acting.effects.find("contact"), acting.PARAMETERS["contact"] | {"bones": ["lid"]}, "test")
-    facts = open_formats.facts(scene, replace(built, effects=(*built.effects, contact)))
+    facts = open_formats.facts(replace(built, effects=(*built.effects, contact)))
     assert [bone["obstacle"] for bone in facts["bones"]] == [False, True]
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_stated(scene: MuscleCase, built: MuscleProblem, name: str) -> None:
+def test_every_effect_can_be_stated(built: MuscleProblem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
-    (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
+    (printed,) = open_formats.facts(replace(built, effects=(effect,)))["effects"]
     assert printed["name"] == name
-    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
+    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys() - {
+        "region"
+    }
+
+
+def test_regions_are_exported_with_what_acts_in_them(scene: MuscleCase, built: MuscleProblem, tmp_path: Path) -> None:
+    table = {"name": "tendon", "width": "0 mm", "attachment": {"name": "origin", "length": "8 mm"}}
+    laws = [{"name": "neo_hooke", "mu": mu, "in": at} for mu, at in (("1 kPa", "not tendon"), ("1 MPa", "tendon"))]
+    volume = {"name": "incompressible", "bulk": "10 MPa"}
+    there = casefile.read_muscle(scene.folder, changes={"region": [table], "effect": [*laws, volume]})
+    problem = replace(built, effects=there.effects, regions=muscle.setup(there).regions)
+    open_formats.write(problem, tmp_path, {})
+    facts = json.loads((tmp_path / "scene.json").read_text())
+    assert [effect.get("in") for effect in facts["effects"]] == ["not tendon", "tendon", None]
+    assert facts["regions"] == ["tendon"]
+    middles = built.mesh.points[built.mesh.tets].mean(axis=1)
+    for name in ("tets.vtu", "tets.msh"):
+        found = meshio.read(tmp_path / name).cell_data["region_tendon"][0]
+        assert np.array_equal(found, problem.regions["tendon"](middles))
+    assert 0 < found.mean() < 0.5
+    with pytest.raises(InputError, match=r'effect\[0\]\.in: got "not tendon", want a law of the whole muscle'):
+        febio.check(there)

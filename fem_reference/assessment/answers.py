@@ -1,0 +1,62 @@
+"""Answers to what is asked of a study first: a setting within an error, at a rate of frames, and at the knee of the front."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from fem_reference.assessment.recommendation import Expected, chosen
+
+ERRORS = (1.0, 5.0)  # in the unit of the metric
+RATE = 60.0  # frames a second
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The ``best`` setting for a request, of all or None, and ``by_solver``; the ``limits`` of error and time [s] are empty for the
+    knee. ``nearest``: the setting that misses the limits least, where none meets them.
+    """
+
+    limits: Mapping[str, float]
+    best: Expected | None
+    nearest: Expected | None
+    by_solver: Mapping[str, Expected]
+
+
+def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
+    """The answers for each error, for the rate, and for the knee."""
+    requests = [*({"error": error} for error in ERRORS), {"time": 1 / RATE}]
+    of = {name: [one for one in known if one.point.solver == name] for name in dict.fromkeys(_solvers(known))}
+    found = [
+        (limits, chosen(known, limits), {name: chosen(some, limits)[0] for name, some in of.items()})
+        for limits in requests
+    ]
+    found.append(({}, (knee(known), None), {name: knee(some) for name, some in of.items()}))
+    return tuple(
+        Answer(limits, best, nearest, {name: one for name, one in by_solver.items() if one is not None})
+        for limits, (best, nearest), by_solver in found
+    )
+
+
+def _solvers(known: Iterable[Expected]) -> list[str]:
+    return [one.point.solver for one in known]
+
+
+def knee(known: Iterable[Expected]) -> Expected | None:
+    """The setting at the knee of the front of error against time: in logarithms, farthest below the line that joins its ends (Das
+    1999, Structural Optimization 18, 107-115). None of a front of fewer than three points, or of one that is nowhere below it.
+    """
+    front = list[Expected]()
+    for one in sorted(known, key=lambda one: (one.time, one.error)):
+        if not front or one.error < front[-1].error:
+            front.append(one)
+    if len(front) < 3:
+        return None
+    first, last = front[0], front[-1]
+
+    def below(one: Expected) -> float:
+        along = math.log(one.time / first.time) / math.log(last.time / first.time)
+        down = math.log(first.error / one.error) / math.log(first.error / last.error)
+        return down - along
+
+    best = max(front[1:-1], key=below)
+    return best if below(best) > 0 else None

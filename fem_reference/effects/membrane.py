@@ -1,0 +1,40 @@
+"""Membranes on the surface, which resist stretch and not bending: aponeurosis, fascia."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Load, State
+from fem_reference.foundations.units import PositiveLength, PositivePressure
+
+
+class Membrane(Load):
+    """``h mu/2 (I + 1/a^2 - 3)`` per rest area, with ``I = tr C - N . C N`` the sum of the squared stretches in the surface, a its
+    present area over that at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose thickness
+    follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, of membranes).
+
+    ``on``: the part of the surface, and ``in`` a region, if any, by the share that it has of this part, linear between the vertices
+    of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].
+
+    Stretched by l in all directions it has the tension ``h mu (1 - l^-6)`` per present length. Where it is compressed it would
+    wrinkle, which it resists here instead: as a sheet that the tissue below holds flat.
+    """
+
+    outer: ClassVar[bool] = False
+    stored: ClassVar[bool] = True
+    example: ClassVar[dict[str, Any]] = {"thickness": "0.5 mm", "mu": "10 MPa"}
+    thickness: PositiveLength
+    mu: PositivePressure
+    region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
+
+    @property
+    def title(self) -> str:
+        """Its name among the effects of a scene."""
+        return super().title + (f" in {self.region}" if self.region else "")
+
+    def potential(self, state: State, normal: Sequence[Any]) -> Any:
+        """Energy per rest area [N/mm], by the share of the point in its region."""
+        area = sum(sum(c * n for c, n in zip(row, normal, strict=True)) ** 2 for row in state.cofactors)
+        inside = state.I1 - state.square_stretch(normal)
+        return state.share(self.region) * self.thickness * self.mu / 2 * (inside + 1 / area - 3)

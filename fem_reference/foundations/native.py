@@ -1,0 +1,42 @@
+"""Small files of C, compiled once for this machine and kept."""
+
+import hashlib
+import os
+import platform
+import subprocess
+import sysconfig
+import tempfile
+from collections.abc import Sequence
+from ctypes import CDLL
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def machine() -> str:
+    """The kind of this processor, as a hash: code compiled for one kind need not run on another."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        known = next(line for line in lines if line.startswith(("flags", "Features")))
+    except (OSError, StopIteration):
+        known = platform.processor()
+    return hashlib.sha256(f"{platform.machine()} {known}".encode()).hexdigest()[:12]
+
+
+def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
+    """The functions of a C file, compiled with ``flags`` and kept in a ``folder``; OSError without a compiler or such a folder,
+    RuntimeError with what the compiler says where it cannot compile the file.
+    """
+    compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
+    key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *flags, machine()]).encode())
+    kept = folder / f"fem_reference_{source.stem}_{key.hexdigest()[:16]}.so"
+    if not kept.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as new:
+            made = Path(new) / kept.name
+            command = [*compiler, *flags, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made), "-lm"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise RuntimeError(f"{command[0]} cannot compile {source}: {done.stderr.strip()}")
+            made.replace(kept)  # atomic, also where several processes compile it
+    return CDLL(str(kept))

@@ -1,0 +1,278 @@
+/* Pairs of triangles that may intersect or touch: all that do, and few that do not.
+
+   Boxes are met in a regular grid. A pair is left out only where a plane certainly separates its triangles, or where they share an
+   edge. Coordinates enter by their differences, which are rounded relatively: SURE is thousands of such roundings.
+*/
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#define SURE 1e-12
+
+#define LESS(a, b) ((a) < (b) ? (a) : (b))
+#define MORE(a, b) ((a) > (b) ? (a) : (b))
+
+typedef struct { /* with the first and last cells of a grid that it touches, and its longest edge */
+    double low[3], high[3], size;
+    int first[3], last[3];
+} Box;
+typedef struct { double low[3], edge; int size[3]; int64_t *starts, *inside; } Grid;
+typedef struct { /* triangles (count, 3) of points (, 3) */
+    int64_t count;
+    const double *points;
+    const int64_t *corners;
+} Surface;
+typedef struct { /* pairs (room, 2) of triangles of two surfaces, filled up to room */
+    const Surface *one, *other;
+    int64_t room, count, *pairs;
+} Found;
+
+static Box box_of(const Surface *s, int64_t t)
+{
+    const double *p = s->points + 3 * s->corners[3 * t];
+    Box found = {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}, 0, {0}, {0}};
+    for (int c = 1; c < 3; c++) {
+        p = s->points + 3 * s->corners[3 * t + c];
+        for (int i = 0; i < 3; i++) {
+            found.low[i] = LESS(p[i], found.low[i]);
+            found.high[i] = MORE(p[i], found.high[i]);
+        }
+    }
+    for (int i = 0; i < 3; i++)
+        found.size = MORE(found.size, found.high[i] - found.low[i]);
+    return found;
+}
+
+static void widen(Box *box, const Box *other)
+{
+    for (int i = 0; i < 3; i++) {
+        box->low[i] = LESS(box->low[i], other->low[i]);
+        box->high[i] = MORE(box->high[i], other->high[i]);
+    }
+}
+
+static int apart(const Box *one, const Box *other)
+{
+    for (int i = 0; i < 3; i++)
+        if (one->low[i] > other->high[i] || other->low[i] > one->high[i])
+            return 1;
+    return 0;
+}
+
+/* The cell of a coordinate rises with it, so that two boxes that touch share the cell of their greatest low corner. */
+static void place(const Grid *grid, Box *box)
+{
+    double share = 1 / grid->edge;
+    for (int i = 0; i < 3; i++) {
+        double first = (box->low[i] - grid->low[i]) * share, last = (box->high[i] - grid->low[i]) * share;
+        box->first[i] = first < 1 ? 0 : first < grid->size[i] ? (int)first : grid->size[i] - 1;
+        box->last[i] = last < 1 ? 0 : last < grid->size[i] ? (int)last : grid->size[i] - 1;
+    }
+}
+
+/* At most about four cells a box, and no smaller than boxes are on average. */
+static Grid grid_over(const Box *boxes, int64_t count, Box *hull)
+{
+    double extent = 0, volume = 1;
+    *hull = boxes[0];
+    for (int64_t t = 0; t < count; t++) {
+        widen(hull, boxes + t);
+        extent += boxes[t].size / (double)count;
+    }
+    Grid grid = {{hull->low[0], hull->low[1], hull->low[2]}, extent, {1, 1, 1}, NULL, NULL};
+    for (int i = 0; i < 3; i++)
+        volume *= hull->high[i] - hull->low[i] + extent;
+    grid.edge = MORE(extent, cbrt(volume / (4 * (double)count)));
+    for (int i = 0; i < 3 && grid.edge > 0; i++)
+        grid.size[i] = (int)LESS(1000, 1 + (hull->high[i] - hull->low[i]) / grid.edge);
+    return grid;
+}
+
+static void cross(const double *a, const double *b, double *found)
+{
+    for (int i = 0; i < 3; i++)
+        found[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+/* Whether all of a is certainly above all of b along a normal, or below; within is what heights are sure to. */
+static int parts(const double *normal, double (*a)[3], double (*b)[3], double within)
+{
+    double lows[2] = {INFINITY, INFINITY}, highs[2] = {-INFINITY, -INFINITY};
+    for (int k = 0; k < 6; k++) {
+        const double *p = k < 3 ? a[k] : b[k - 3];
+        double height = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2];
+        lows[k / 3] = LESS(height, lows[k / 3]);
+        highs[k / 3] = MORE(height, highs[k / 3]);
+    }
+    return lows[0] - highs[1] > within || lows[1] - highs[0] > within;
+}
+
+/* 1 or -1 where points are certainly all above or all below the plane of that normal through the origin, else 0. */
+static int side(const double *normal, double (*points)[3], int count, double within)
+{
+    int above = 0, below = 0;
+    for (int k = 0; k < count; k++) {
+        const double *p = points[k];
+        double height = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2];
+        above += height > within;
+        below += height < -within;
+    }
+    return (above == count) - (below == count);
+}
+
+/* Two triangles with one corner in common, the origin: whether a plane through it certainly separates their other corners. */
+static int parted_at_corner(double (*a)[3], double (*b)[3], double size)
+{
+    double normal[3], across[3], within = SURE * size * size;
+    for (int i = 0; i < 3; i++)
+        normal[i] = a[0][i] + a[1][i] - b[0][i] - b[1][i];
+    if (side(normal, a, 2, within) * side(normal, b, 2, within) < 0)
+        return 1;
+    for (int turn = 0; turn < 2; turn++) {
+        double (*one)[3] = turn ? b : a, (*other)[3] = turn ? a : b;
+        cross(one[0], one[1], across);
+        if (side(across, other, 2, within * size))
+            return 1; /* all of it beside the plane of this one */
+        for (int k = 0; k < 2; k++) { /* beyond an edge of this one, upright on its plane */
+            cross(across, one[k], normal);
+            if (side(normal, other, 2, within * size * size) * side(normal, one + 1 - k, 1, within * size * size) < 0)
+                return 1;
+        }
+    }
+    return 0;
+}
+
+static int parted(double (*a)[3], double (*b)[3], double size)
+{
+    double normal[3], edges[2][3];
+    for (int i = 0; i < 3; i++)
+        normal[i] = a[0][i] + a[1][i] + a[2][i] - b[0][i] - b[1][i] - b[2][i];
+    if (parts(normal, a, b, SURE * size * size))
+        return 1;
+    for (int side = 0; side < 2; side++) {
+        double (*one)[3] = side ? b : a, (*other)[3] = side ? a : b;
+        for (int k = 0; k < 2; k++)
+            for (int i = 0; i < 3; i++)
+                edges[k][i] = one[k + 1][i] - one[0][i];
+        cross(edges[0], edges[1], normal);
+        if (parts(normal, one, other, SURE * size * size * size))
+            return 1;
+    }
+    return 0;
+}
+
+/* Whether triangles s and t may meet but at a common corner; names of points are compared where both are of one surface. Their
+   boxes, which touch, are as large as size together. */
+static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t t, double size)
+{
+    const int64_t *names = one->corners + 3 * s, *others = other->corners + 3 * t;
+    int shared = 0, mine = 0, its = 0;
+    for (int i = 0; i < 3 && one->points == other->points; i++)
+        for (int j = 0; j < 3; j++)
+            if (names[i] == others[j]) {
+                shared++;
+                mine = i;
+                its = j;
+            }
+    if (shared > 1)
+        return 0;
+    if (!(size > 1e-50)) /* powers of it would be rounded absolutely */
+        return 1;
+    double a[3][3], b[3][3];
+    const double *origin = one->points + 3 * names[mine];
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++) {
+            a[k][i] = one->points[3 * names[(mine + k) % 3] + i] - origin[i];
+            b[k][i] = other->points[3 * others[(its + k) % 3] + i] - origin[i];
+        }
+    size *= 6; /* of sums and differences of three corners too */
+    return !(shared ? parted_at_corner(a + 1, b + 1, size) : parted(a, b, size));
+}
+
+#define EVERY_CELL(box)                                                                       \
+    for (int x = (box).first[0]; x <= (box).last[0]; x++)                                    \
+        for (int y = (box).first[1]; y <= (box).last[1]; y++)                                \
+            for (int64_t z = (box).first[2], at = ((int64_t)x * grid.size[1] + y) * grid.size[2] + z; z <= (box).last[2]; z++, at++)
+
+/* Sort boxes into the cells of the grid; 0 without memory. */
+static int fill(Grid *filled, Box *boxes, int64_t count)
+{
+    Grid grid = *filled;
+    int64_t cells = (int64_t)grid.size[0] * grid.size[1] * grid.size[2];
+    grid.starts = calloc((size_t)cells + 2, sizeof *grid.starts);
+    for (int64_t t = 0; grid.starts && t < count; t++) {
+        place(&grid, boxes + t);
+        EVERY_CELL(boxes[t])
+            grid.starts[at + 2]++;
+    }
+    for (int64_t c = 2; grid.starts && c < cells + 2; c++)
+        grid.starts[c] += grid.starts[c - 1];
+    grid.inside = grid.starts ? malloc((size_t)(grid.starts[cells + 1] + 1) * sizeof *grid.inside) : NULL;
+    for (int64_t t = 0; grid.inside && t < count; t++)
+        EVERY_CELL(boxes[t])
+            grid.inside[grid.starts[at + 1]++] = t;
+    *filled = grid;
+    return grid.inside != NULL;
+}
+
+/* Add the pair s and t where it may meet; each once, in the cell of the greatest low corner of its boxes. */
+static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *its, const int *cell)
+{
+    for (int i = 0; i < 3; i++)
+        if (cell[i] != MORE(box->first[i], its->first[i]))
+            return;
+    if (apart(box, its) || !may_meet(found->one, s, found->other, t, box->size + its->size))
+        return;
+    if (found->count < found->room) {
+        found->pairs[2 * found->count] = s;
+        found->pairs[2 * found->count + 1] = t;
+    }
+    found->count++;
+}
+
+static void add_of_one(Found *found, Grid grid, const Box *boxes)
+{
+    Box whole = {{0}, {0}, 0, {0}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
+    EVERY_CELL(whole)
+        for (int64_t i = grid.starts[at]; i < grid.starts[at + 1]; i++)
+            for (int64_t k = i + 1; k < grid.starts[at + 1]; k++) {
+                int64_t s = grid.inside[i], t = grid.inside[k];
+                add(found, s, boxes + s, t, boxes + t, (int[]){x, y, (int)z});
+            }
+}
+
+static void add_of_two(Found *found, Grid grid, const Box *boxes, const Box *hull)
+{
+    for (int64_t s = 0; s < found->one->count; s++) {
+        Box box = box_of(found->one, s);
+        if (apart(&box, hull))
+            continue;
+        place(&grid, &box);
+        EVERY_CELL(box)
+            for (int64_t i = grid.starts[at]; i < grid.starts[at + 1]; i++)
+                add(found, s, &box, grid.inside[i], boxes + grid.inside[i], (int[]){x, y, (int)z});
+    }
+}
+
+/* Fill up to room pairs (room, 2) of triangles of two surfaces, or of one with itself, each pair once. Their number, which may be
+   more than room; -1 without memory. */
+int64_t near_pairs(Surface one, Surface other, int itself, int64_t room, int64_t *pairs)
+{
+    Found found = {&one, &other, room, 0, pairs};
+    Box hull, *boxes = other.count > 0 ? malloc((size_t)other.count * sizeof *boxes) : NULL;
+    if (!boxes)
+        return -1;
+    for (int64_t t = 0; t < other.count; t++)
+        boxes[t] = box_of(&other, t);
+    Grid grid = grid_over(boxes, other.count, &hull);
+    int filled = fill(&grid, boxes, other.count);
+    if (filled && itself)
+        add_of_one(&found, grid, boxes);
+    else if (filled)
+        add_of_two(&found, grid, boxes, &hull);
+    free(boxes);
+    free(grid.starts);
+    free(grid.inside);
+    return filled ? found.count : -1;
+}

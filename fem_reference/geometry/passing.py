@@ -1,0 +1,46 @@
+"""Points that pass through moving triangles from their front to their back."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.foundations.mesh import Floats, normals
+
+_SHARES = np.arange(4) / 3
+# From the values of a cubic at these shares to its coefficients, and to those of Bernstein, which bound it.
+_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))
+_BERNSTEIN = np.linalg.inv(
+    np.stack([(1, 3, 3, 1)[i] * _SHARES**i * (1 - _SHARES) ** (3 - i) for i in range(4)], axis=1)
+)
+
+
+def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
+    """Mask (n,) of points that go straight from ``starts`` to ``ends`` (n, 3) and meanwhile pass through the triangle beside them,
+    whose corners go straight from ``before`` to ``after`` (n, 3, 3), from the side that sees them counterclockwise.
+
+    The volume between a point and a triangle is a cubic of the share of the path (Provot 1997, Collision and self-collision
+    handling in cloth model dedicated to design garments); where it falls to 0 the point is in the plane.
+    """
+
+    def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:
+        return tuple(a[some] + share * (b[some] - a[some]) for a, b in ((starts, ends), (before, after)))  # type: ignore[return-value]
+
+    every = slice(None)
+    volumes = np.stack([_volume(*at(share, every)) for share in _SHARES])
+    found = np.zeros(len(starts), bool)
+    for i in np.flatnonzero((volumes[0] > 0) & ~((_BERNSTEIN @ volumes).min(axis=0) > 0)):
+        roots = np.roots(_CUBIC @ volumes[:, i])
+        shares = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real >= 0) & (roots.real <= 1)]
+        found[i] = any(_is_inside(*at(share, np.array([i]))) for share in shares)
+    return found
+
+
+def _volume(points: Floats, triangles: Floats) -> Floats:
+    """Six times the volumes (n,) between points (n, 3) and triangles (n, 3, 3), positive in front."""
+    return np.asarray(np.einsum("ni,ni->n", points - triangles[:, 0], normals(triangles)))
+
+
+def _is_inside(point: Floats, triangle: Floats) -> bool:
+    """True where a ``point`` (1, 3) of the plane of a ``triangle`` (1, 3, 3) is in it."""
+    across = normals(triangle)[0]
+    arms = triangle[0] - point
+    return bool((np.cross(arms, np.roll(arms, -1, axis=0)) @ across >= 0).all())

@@ -1,0 +1,106 @@
+"""Regions of a body at rest: the share, from 0 to 1, that a point has in each, independent of any mesh of the body."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Surface, tet_volumes
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.fibres import FibreField
+from fem_reference.geometry.signed_distance import signed_distances
+
+# From points (n, 3) [mm] at rest to their shares (n,), from 0 to 1; and to their depths (n,) [mm] below a border. Picklable.
+Region = Callable[[Floats], Floats]
+Depth = Callable[[Floats], Floats]
+# The factor by which the share rises over the width, from its first part on.
+_RISE = 1000.0
+# Points at the border of a cell are asked for this share of the way to its middle: they are in the regions that the cell is in.
+INWARDS = 1e-6
+# Sample points of a body: about as many, whatever its size.
+_SAMPLES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Blended:
+    """The region of depth above 0: by ``(1000^t - 1) / 999``, t from 0 to 1, from a share of 0 at the border to 1 at a depth of
+    ``width`` [mm].
+
+    So the stiffness goes from that of the body to the thousandfold by the same factor in each part of the width, and elements that
+    resolve the width converge; by ``3 t^2 - 2 t^3`` most of it would be in a fiftieth of the width. The stiffer of two materials
+    is therefore best the region, and the softer the rest. In series, a part of 0.14 of the width counts as soft.
+    """
+
+    depth: Depth
+    width: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """The shares (n,)."""
+        depth = self.depth(points)
+        if self.width == 0:
+            return np.where(depth >= 0, 1.0, 0.0)
+        t = np.clip(depth / self.width, 0, 1)
+        return np.asarray((_RISE**t - 1) / (_RISE - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Union:
+    """All of several ``regions``: ``1 - (1 - a) (1 - b) ...``."""
+
+    regions: tuple[Region, ...]
+
+    def __call__(self, points: Floats) -> Floats:
+        """The shares (n,)."""
+        return np.asarray(1 - np.prod([1 - region(points) for region in self.regions], axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """The depth inside a closed ``surface``."""
+
+    surface: Surface
+
+    def __call__(self, points: Floats) -> Floats:
+        """The depths (n,) [mm]."""
+        return -signed_distances(points, self.surface)
+
+
+@dataclass(frozen=True, eq=False)
+class Around:
+    """The part of a body within a ``reach`` [mm] of a ``surface``, closed or not."""
+
+    surface: Surface
+    reach: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """The depths (n,) [mm]."""
+        return self.reach - distances(points, self.surface).distance
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """The part of a body where a Laplace ``field`` between two attachments is from ``first`` to ``last``; 0 and 1 mean up
+    to an attachment. A difference of the field over its mean slope is a depth.
+    """
+
+    field: FibreField
+    first: float
+    last: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """The depths (n,) [mm]."""
+        mesh = self.field.mesh
+        values = self.field.locator.embed(points).interpolate(mesh, self.field.values)
+        slopes = np.linalg.norm(self.field.gradients[mesh.tets].mean(axis=1), axis=1)
+        above = values - self.first if self.first > 0 else np.inf
+        inside = np.minimum(above, self.last - values if self.last < 1 else np.inf)
+        return np.asarray(inside / np.average(slopes, weights=tet_volumes(mesh.points, mesh.tets)))
+
+
+def samples(surface: Surface) -> Floats:
+    """Points (n, 3) [mm] inside a closed ``surface``, those of a regular grid, about 20,000: each stands for the same volume."""
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    step = np.cbrt(np.prod(high - low) / _SAMPLES)
+    axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid[signed_distances(grid, surface) < 0]

@@ -1,0 +1,108 @@
+"""The regions of a muscle, as its case gives them; checks of those of any body, and their sizes in words."""
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+
+from fem_reference.effects import Energy, State, region_of
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.material_point import REST
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, check_closed, enclosed_volume, place_of
+from fem_reference.foundations.records import join
+from fem_reference.geometry.fibres import fibre_field
+from fem_reference.geometry.regions import Around, Between, Blended, Depth, Inside, Region, Union, samples
+from fem_reference.geometry.sectors import attached_shares
+from fem_reference.io import files
+from fem_reference.problems.anatomy import field_mesh
+from fem_reference.problems.body import Body
+from fem_reference.problems.setup import Setup
+from fem_reference.scenes.muscle import MuscleCase
+
+_LEAST = 0.5  # the least share of laws of a kind at a point
+_ROUNDED = 1e-6  # the error of a sum of shares that is one
+_SEEN = 1e-3  # an overlap, as a share of the volume, that is worth a word
+
+
+def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> dict[str, Region]:
+    """The regions of a case by name, in its set-up ``rest``; those of one name are one. ``fill``: tetrahedra of a size [mm]."""
+    found: dict[str, list[Region]] = {}
+    for i, region in enumerate(case.region):
+        found.setdefault(region.name, []).append(Blended(_depth(case, i, rest, fill), region.width))
+    return {name: parts[0] if len(parts) == 1 else Union(tuple(parts)) for name, parts in found.items()}
+
+
+def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMesh]) -> Depth:
+    """The depth in ``case.region[i]``."""
+    region, key = case.region[i], f"region[{i}]"
+    if (near := region.attachment) is not None:
+        shares = next(
+            attached_shares(rest.surface, one.vertices) for one in rest.attached if one.attachment == near.name
+        )
+        whole = shares.all(axis=1) if shares.all(axis=1).any() else shares.any(axis=1)
+        return Around(Surface(rest.surface.points, rest.surface.triangles[whole]), near.length)
+    if (patch := region.patch) is not None:
+        return Around(files.read_surface(case.file(patch.file, f"{key}.patch.file"), patch.unit), patch.depth)
+    if (closed := region.surface) is not None:
+        place = join(case.place, f"{key}.surface.file")
+        given = files.read_surface(case.file(closed.file, f"{key}.surface.file"), closed.unit)
+        return Inside(check_closed(Surface(given.points, given.triangles, f"{place}: {given.place}")))
+    if (tets := region.tets) is not None:
+        path = case.file(tets.file, f"{key}.tets.file")
+        return Inside(check_closed(files.read_labelled(path, tets.unit, tets.array, tets.labels)))
+    share = region.field
+    assert share is not None  # a CaseRegion record has one of the five
+    return Between(fibre_field(field_mesh(rest.surface, fill), share.start, share.end), share.first, share.last)
+
+
+def facts(rest: Setup) -> dict[str, str]:
+    """The volume of each region of a muscle, and of what it has in common with others, in words."""
+    points, volume = samples(rest.surface), enclosed_volume(rest.surface.points, rest.surface.triangles)
+    shares = {name: region(points) for name, region in rest.regions.items()}
+
+    def size(share: Floats) -> str:
+        return f"{100 * share.mean():.3g} % of the volume, {share.mean() * volume:.4g} mm3"
+
+    found = {name: size(share) for name, share in shares.items()}
+    for (one, a), (other, b) in combinations(shares.items(), 2):
+        if (a * b).mean() > _SEEN:
+            found[f"{one} and {other} overlap in"] = size(a * b)
+    return found
+
+
+def check(body: Body) -> None:
+    """Raise InputError where an effect acts in a region that there is not, or nowhere, or shares are not from 0 to 1; or where laws
+    of shape, of volume, or of the pressure unknown leave a part of the body without.
+    """
+    named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
+    for i, region in named.items():
+        if region.removeprefix(REST) not in body.regions:
+            want = f"a region of the body: {', '.join(body.regions) or 'it has none'}"
+            raise InputError(f"effects[{i}].in", f'"{region}"', want)
+    if not named:
+        return
+    points = np.concatenate(list(body.mesh.places()))
+    at = State(F=(), regions=body.shares(points))
+    for i, region in named.items():
+        share = at.share(region)
+        if not (share.min() >= 0 and share.max() <= 1):
+            raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
+        if share.max() == 0:
+            raise InputError(f"effects[{i}].in", f'"{region}", which is nowhere in the body', "a part of the body")
+    laws = [effect for effect in body.effects if isinstance(effect, Energy)]
+    _check_whole("shape", [law for law in laws if law.moduli().shear], at, points)
+    _check_whole("volume", [law for law in laws if law.moduli().bulk and not law.unknowns], at, points)
+    _check_whole("pressure", [law for law in laws if law.unknowns], at, points)
+
+
+def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
+    """Raise InputError where ``laws`` of one ``kind``, if there are some, leave one of the ``points`` (n, 3) without. Of those that
+    share the pressure unknown p the shares are 1 together: else p is no pressure.
+    """
+    total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
+    off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
+    if laws and not off.max() <= 0:
+        named, worst = ", ".join(law.title for law in laws), int(off.argmax())
+        got = f"laws of {kind} ({named}) with a share of {total[worst]:.3g} at {place_of(points[worst])}"
+        want = "1 everywhere" if kind == "pressure" else f"at least {_LEAST:g} everywhere"
+        raise InputError("effects", got, f'{want}: a law without "in", or one in "{REST}NAME" beside one in "NAME"')

@@ -1,0 +1,49 @@
+"""Contact between parts of the surface of one body, which lie on separate pieces of its mesh: several bodies solved as one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, connected_parts
+from fem_reference.problems.contact import penalty
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Frictionless contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
+    facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
+    of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
+    """
+
+    one: str
+    other: str
+    stiffness: float
+    smoothing: float
+
+    @property
+    def forces(self) -> tuple[str, str]:
+        """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
+        return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
+
+    def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
+        return penalty(gap, self.stiffness, self.smoothing)
+
+
+def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints]) -> None:
+    """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
+    separate pieces of the mesh of ``cells`` (m, k).
+    """
+    if not touching:
+        return
+    piece = connected_parts(np.repeat(cells[:, 0], cells.shape[1]), cells.ravel(), int(cells.max()) + 1)
+    for i, law in enumerate(touching):
+        for name, value in (("stiffness", law.stiffness), ("smoothing", law.smoothing)):
+            if not (isfinite(value) and value > 0):
+                raise InputError(f"touching[{i}].{name}", value, "a number above 0")
+        if len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
+            got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
+            raise InputError(f"touching[{i}]", got, "regions of separate pieces, as no piece touches itself")

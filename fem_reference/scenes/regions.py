@@ -1,0 +1,105 @@
+"""The regions of a muscle in a case, in which effects act: tendons, aponeuroses, fat, compartments."""
+
+from collections.abc import Sequence
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from fem_reference.effects import Effect, region_of
+from fem_reference.foundations.material_point import REST
+from fem_reference.foundations.records import Name, Record, check_used, one_of
+from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
+
+
+class LengthFromAttachment(Record):
+    """All within a ``length`` of the patch of an attachment, by its ``name``."""
+
+    name: str
+    length: PositiveLength
+
+
+class DepthBelowPatch(Record):
+    """All within a ``depth`` of the triangles in a file."""
+
+    file: str
+    unit: LengthUnit
+    depth: PositiveLength
+
+
+class ClosedSurface(Record):
+    """All inside a closed triangle surface in a file."""
+
+    file: str
+    unit: LengthUnit
+
+
+class LabelledTets(Record):
+    """All inside the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
+
+    file: str
+    unit: LengthUnit
+    array: str
+    labels: tuple[int, ...] = Field(min_length=1)
+
+
+class ShareOfField(Record):
+    """All where the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
+
+    start: str
+    end: str
+    first: float = Field(ge=0, lt=1)
+    last: float = Field(gt=0, le=1)
+
+    @field_validator("last")
+    @classmethod
+    def _check_last(cls, last: float, info: ValidationInfo) -> float:
+        if not last > info.data.get("first", 0):
+            raise ValueError("more than the first")
+        return last
+
+
+class CaseRegion(Record):
+    """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface``, ``tets``
+    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are one.
+    """
+
+    name: Name
+    width: Length
+    attachment: LengthFromAttachment | None = None
+    patch: DepthBelowPatch | None = None
+    surface: ClosedSurface | None = None
+    tets: LabelledTets | None = None
+    field: ShareOfField | None = None
+
+    _check = one_of("attachment", "patch", "surface", "tets", "field")
+
+    @field_validator("name")
+    @classmethod
+    def _check_name(cls, name: str) -> str:
+        if name.startswith(REST):
+            raise ValueError(f'a name that does not begin with "{REST}", which stands for the rest of the muscle')
+        return name
+
+    @field_validator("width")
+    @classmethod
+    def _check_width(cls, width: float) -> float:
+        if not width >= 0:
+            raise ValueError("a length of 0 or more")
+        return width
+
+
+def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
+    """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that is not there, or one of
+    the ``regions`` is at another attachment than one of ``attachments``.
+    """
+    laws = [
+        (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))
+    ]
+    check_used([one.name for one in regions], laws, place)
+    for i, one in enumerate(regions):
+        near = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
+        ends = (
+            [(f"region[{i}].field.start", one.field.start), (f"region[{i}].field.end", one.field.end)]
+            if one.field
+            else []
+        )
+        check_used(attachments, near + ends, place)

@@ -1,0 +1,287 @@
+"""A solver of your own as a command: it reads the scene from one folder and writes its frames into another one.
+
+The command is started without a shell, once for each run. ``{scene}`` stands for the folder with the scene, as ``export`` writes
+it, ``{out}`` for an empty folder that the frames go into, and other names in braces for settings. A scene file cannot choose
+this solver: it would run a program.
+"""
+
+import hashlib
+import inspect
+import os
+import re
+import shlex
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cloudpickle
+import numpy as np
+from pydantic import ConfigDict, Field, computed_field, create_model
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Name, Record, join, parse
+from fem_reference.foundations.subprocesses import scratch_folder
+from fem_reference.foundations.units import LengthUnit, Time, length_unit
+from fem_reference.io import files, texts
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.runs.contents import Status
+from fem_reference.runs.store import Outcome, Sink
+from fem_reference.scenes.case import COMMAND, Candidate, SolverChoice
+from fem_reference.solvers import recorded
+from fem_reference.solvers.common import open_formats, programs
+from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
+
+_PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
+FOLDERS = ("scene", "out")
+# What a Python of its own executes: a pickled function with the folders.
+_CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
+Value = int | float | str
+
+
+class CommandSettings(Record):
+    """The command, and the value of each setting in it.
+
+    ``unit``: the unit of length of its frames, by default what a ``candidate.toml`` beside them says, else mm. ``version``: of the
+    program. ``files``: files and folders that determine its results beside those that the command names. ``moves``: the carrier
+    of its unknowns. ``time_limit``: processor time after which it is ended. ``directory``: where it runs. ``ladder``: useful
+    values of settings, from the fastest to the most accurate.
+    """
+
+    model_config = ConfigDict(protected_namespaces=())
+    command: str
+    unit: LengthUnit | None = None
+    version: Name | None = None
+    files: tuple[str, ...] = ()
+    moves: Literal["surface", "tetrahedra"] = "surface"
+    time_limit: Time = 600.0
+    directory: str = Field(default=".", exclude=True)
+    ladder: dict[str, tuple[Value, ...]] = Field(default_factory=dict, exclude=True)
+
+    @property
+    def place(self) -> Path:
+        """The folder that it runs in."""
+        return Path(self.directory).absolute()
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def program(self) -> str:
+        """A hash over the contents of :func:`sources`, as a part of the key of a run."""
+        digest = hashlib.sha256()
+        for path in sources(self):
+            digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+        return digest.hexdigest()[:16]
+
+
+def sources(settings: CommandSettings) -> list[Path]:
+    """The program, the files that words of the command name, with a Python file all Python files beside it, and ``files``."""
+    directory, words = settings.place, shlex.split(settings.command)
+    program = programs.found(words[0], directory)
+    named = [directory / word for word in words[1:]] + ([] if program is None else [program])
+    found = {path for path in named if path.is_file()}
+    for name in settings.files:
+        path = directory / name
+        if not path.exists():
+            raise InputError("files", f'"{name}", which is not at {path}', "a file or folder that exists")
+        found |= {path} if path.is_file() else {one for one in path.rglob("*") if one.is_file()}
+    found |= {beside for path in found if path.suffix == ".py" for beside in path.parent.glob("*.py")}
+    return sorted(path for path in found if "__pycache__" not in path.parts)
+
+
+class Description(recorded.About):
+    """The contents of ``candidate.toml`` where a command is given: that of frames, with the settings of the command."""
+
+    settings: dict[str, Value] = Field(default_factory=dict)
+    ladder: dict[str, tuple[Value, ...]] = Field(default_factory=dict)
+    files: tuple[str, ...] = ()
+    moves: str | None = None
+    time_limit: str | None = None
+
+
+def choice(command: str, directory: Path, place: str) -> Candidate:
+    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. The ``candidate.toml`` beside
+    the first file that it names and that has one describes it, else the one in the directory.
+    """
+    names = placeholders(command, place)
+    _check_program(command, directory, place)
+    named = [path.parent for word in shlex.split(command) if (path := directory / word).is_file()]
+    places = [folder / recorded.ABOUT for folder in (*named, directory)]
+    file = next((path for path in places if path.exists()), places[-1])
+    said = parse(Description, texts.toml(file), str(file)) if file.exists() else Description()
+    if said.seconds_per_frame is not None or said.threads is not None:
+        want = (
+            f"neither here: time is measured, or stated by a {recorded.ABOUT} that the command writes into its folder"
+        )
+        raise InputError(file, "seconds_per_frame or threads", want)
+    for key in [*said.settings, *said.ladder]:
+        _check_named(key, names, f"{file}: {'settings' if key in said.settings else 'ladder'}")
+    for key in names:
+        if key not in said.settings:
+            raise InputError(f"{file}: settings.{key}", "nothing", f"the value of {{{key}}} in the command")
+    given = said.model_dump(include={"unit", "version", "files", "moves", "time_limit", "ladder"}, exclude_none=True)
+    given |= {"name": said.name or "my_solver", "solver": COMMAND, "command": command, "directory": str(directory)}
+    return parse(Candidate, given | said.settings, place)
+
+
+def of_function(function: Callable[..., None], given: Mapping[str, Any], folder: Path) -> SolverChoice:
+    """The command that calls ``function(scene, out, **settings)`` in a Python of its own; ``given``: its settings, and keys of
+    :class:`CommandSettings`. The function, with the values, is written into a ``folder``.
+    """
+    own = {key: value for key, value in given.items() if key in CommandSettings.model_fields}
+    called = partial(function, **{key: value for key, value in given.items() if key not in own})
+    content = cloudpickle.dumps(called)
+    name = f"{re.sub(r'\W', '', function.__name__)}-{hashlib.sha256(content).hexdigest()[:16]}.pickle"
+    path = (folder / name).absolute()
+    files.make_folder(folder)
+    path.write_bytes(content)
+    paths = os.pathsep.join(str(Path(one).absolute()) for one in sys.path)
+    words = ["env", f"PYTHONPATH={paths}", sys.executable, "-P", "-c", _CALL, str(path)]
+    source = inspect.getsourcefile(inspect.unwrap(function)) if inspect.isroutine(function) else None
+    more = [source] if source is not None and Path(source).is_file() else []
+    listed = {"command": f"{shlex.join(words)} {{scene}} {{out}}", "files": [*own.pop("files", []), *more]}
+    return SolverChoice(**{"solver": COMMAND, **own, **listed})
+
+
+def placeholders(command: str, place: str) -> tuple[str, ...]:
+    """The settings in a ``command``; InputError where it cannot be split, lacks a folder, or has braces around no name."""
+    where = join(place, "command")
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise InputError(where, f'"{command}"', f"words as a shell divides them: {error}") from error
+    strange = [word for word in words if set("{}") & set(_PLACEHOLDER.sub("", word))]
+    if not words or strange:
+        raise InputError(where, f'"{strange[0] if words else ""}"', "a program, with settings such as {iterations}")
+    names = tuple(dict.fromkeys(name for word in words for name in _PLACEHOLDER.findall(word)))
+    for folder in FOLDERS:
+        if folder not in names:
+            raise InputError(where, f'"{command}"', f"{{{folder}}} in it")
+    taken = {*CommandSettings.model_fields, "solver", "name"}
+    for name in names:
+        if name in taken or hasattr(CommandSettings, name):
+            raise InputError(where, f'"{{{name}}}"', "another name of a setting: this one has a meaning here")
+    return tuple(name for name in names if name not in FOLDERS)
+
+
+def _check_named(key: str, names: tuple[str, ...], place: str) -> None:
+    if key not in names:
+        known = ", ".join(names) or "none"
+        raise InputError(f"{place}.{key}", "a setting that the command does not mention", f"one of its own: {known}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandSolver(MuscleSolver[CommandSettings]):
+    """The offer, whose settings are those that the command mentions."""
+
+    def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
+        """The record with a required key for each setting in the command, which is a trade where it has a ladder."""
+        command, ladder = given.get("command"), given.get("ladder", {})
+        if not isinstance(command, str) or not isinstance(ladder, Mapping):
+            return self.settings  # which says what is wrong
+        names = placeholders(command, place)
+        for key in ladder:
+            _check_named(key, names, join(place, "ladder"))
+        kinds = {key: Annotated[Value, Trade(tuple(ladder[key]))] if key in ladder else Value for key in names}
+        fields: dict[str, Any] = {key: (kind, ...) for key, kind in kinds.items()}
+        return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
+
+    def moved(self, settings: CommandSettings) -> Moves:
+        """The carrier that the settings state."""
+        return settings.moves
+
+    def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002
+        """True: the scene that it reads has tetrahedra and fibres."""
+        return True
+
+
+def require(settings: CommandSettings) -> None:
+    """Raise InputError where there is no such program, or a file that it needs is missing."""
+    _check_program(settings.command, settings.place, "command")
+    sources(settings)
+
+
+def _check_program(command: str, directory: Path, place: str) -> None:
+    word = shlex.split(command)[0]
+    if programs.found(word, directory) is None:
+        raise InputError(place, f'"{word}"', f"a program in {directory}, or on the PATH, that may be executed")
+
+
+def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outcome:
+    """Run the command and read the frames that it wrote. A failure is a status; frames before it are kept."""
+    if problem.start is not None:
+        raise InputError("command", "a body that does not start at rest", "one that does: an export has no other start")
+    with scratch_folder() as folder:
+        places = {name: folder / name for name in FOLDERS}
+        for place in places.values():
+            place.mkdir()
+        open_formats.write(problem, places["scene"], {})
+        values = {key: str(value) for key, value in settings} | {key: str(path) for key, path in places.items()}
+        words = shlex.split(settings.command)
+        filled = [_PLACEHOLDER.sub(lambda found: values[found[1]], word) for word in words]
+        try:
+            ended = programs.run(filled, settings.place, settings.time_limit)
+        except OSError as error:
+            return Outcome("crashed", f"{words[0]} does not start: {error.strerror}")
+        return _read(problem, settings, ended, places["out"], sink)
+
+
+def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
+    """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
+    missing or damaged.
+    """
+    kept, trouble, cost = 0, None, _cost(problem, settings, ended)
+    try:
+        said = recorded.checked_about(out, settings.unit)
+        unit = settings.unit or length_unit(said.unit or "mm")
+        for frame in recorded.checked_frames(problem, out, unit):
+            sink(frame)
+            kept += 1
+        cost |= _stated(said, problem, ended)
+    except InputError as error:
+        trouble = error
+    took = f"{ended.seconds:.3g} s, {ended.processor:.3g} s of processor time"
+    last = f" ({ended.said})" if ended.said else ""
+    reached = f"{kept} of {len(problem.frames)} frames are kept"
+    if ended.limit is not None:
+        status, why = ended.limit
+        return Outcome(status, f"{why}{last}; {reached}", cost)
+    if ended.code:
+        how = f"signal {-ended.code}" if ended.code < 0 else f"exit status {ended.code}"
+        return Outcome("crashed", f"{how} after {took}{last}; {reached}", cost)
+    if trouble is not None:
+        failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
+        why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
+        return Outcome(failed, f"exit status 0, but {why}; {reached}", cost)
+    return Outcome("converged", f"{kept} frames in {took}", cost)
+
+
+def _cost(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended) -> dict[str, float]:
+    """The measured cost, with start, reading and writing; unknowns are the coordinates of what it moves."""
+    free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
+    count = free if settings.moves == "surface" else len(problem.mesh.points)
+    used = {"seconds": ended.seconds, "seconds_solve": ended.seconds, "seconds_processor": ended.processor}
+    return used | {"peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
+
+
+def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
+    """The time that the program states for its frames alone; InputError where that is more than it took in all."""
+    found = {} if said.threads is None else {"threads": float(said.threads)}
+    if said.seconds_per_frame is None:
+        return found
+    seconds = said.seconds_per_frame * (problem.frames[-1] - problem.frames[0])
+    if seconds > ended.seconds:
+        want = f"at most the {ended.seconds:.3g} s that the program took"
+        raise InputError(f"{recorded.ABOUT}: seconds_per_frame", f"{seconds:.3g} s for all frames", want)
+    return found | {"seconds_per_frame": said.seconds_per_frame, "seconds_solve": seconds}
+
+
+SOLVES = (
+    CommandSolver(
+        settings=CommandSettings,
+        solve=solve,
+        require=require,
+        example={"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10},
+    ),
+)

@@ -1,0 +1,124 @@
+"""Programs of other people as subprocesses: their time and memory, a limit, and an end that takes their own processes along."""
+
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
+
+from fem_reference.foundations.subprocesses import peak_memory, processor_times
+from fem_reference.runs.contents import Status
+
+# Clock time that may pass, as a multiple of a limit of processor time: beyond it the machine is too busy, or the program waits.
+CLOCK = 10
+_GLANCES = (
+    0.05,
+    1.0,
+)  # [s] at least and at most between two looks at a program; in between a share of the time that it takes
+_SHARE = 0.05
+_TAIL = 4096  # bytes of what it prints that are read
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The end of a program: its exit status ``code`` (negative: the signal), clock time and processor time [s] with the processes
+    that it waited for, the peak memory [MB] of the largest of them at the last look, the last line that it printed, and the limit
+    that ended it.
+    """
+
+    code: int
+    seconds: float
+    processor: float
+    memory: float
+    said: str
+    limit: tuple[Status, str] | None = None
+
+
+def found(word: str, directory: Path) -> Path | None:
+    """The file of a program that is called ``word`` in a ``directory``: there where it has a slash, else on the PATH."""
+    path = shutil.which(str(directory / word) if os.sep in word else word)
+    return None if path is None else Path(path)
+
+
+def run(words: list[str], directory: Path, time_limit: float) -> Ended:
+    """Run a program in a ``directory`` to its end, without a shell and without input; none of its processes outlives the call.
+
+    More than ``time_limit`` [s] of processor time ends it, and ``CLOCK`` times that by the clock. OSError where it does not start.
+    """
+    with TemporaryFile() as printed:
+        begin = time.perf_counter()
+        with _started(words, directory, printed) as process:
+            watch = _Watch(process.pid, time_limit)
+            try:
+                _, status, used = os.wait4(process.pid, 0)
+            finally:
+                watch.done.set()
+        process.returncode = os.waitstatus_to_exitcode(status)
+        seconds, processor = time.perf_counter() - begin, used.ru_utime + used.ru_stime
+        return Ended(process.returncode, seconds, processor, watch.memory, _last_line(printed), watch.overran)
+
+
+@contextmanager
+def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    """The process, in a session of its own, which ends here with all that belongs to it."""
+    process = subprocess.Popen(
+        words, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed, start_new_session=True
+    )
+    try:
+        yield process
+    except BaseException:  # it still runs: the limit of somebody else, or an interruption
+        _kill(process.pid)
+        process.wait()
+        raise
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def _kill(process: int) -> None:
+    """Kill a process that runs and all that descend from it, in sessions of their own too."""
+    for number in processor_times(process) or (process,):
+        with suppress(ProcessLookupError):
+            os.kill(number, signal.SIGKILL)
+
+
+class _Watch:
+    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason where it did; ``memory`` [MB]:
+    the greatest peak of its processes (that of the system begins with the memory of the process that starts them).
+    """
+
+    def __init__(self, process: int, limit: float) -> None:
+        self.process, self.limit, self.memory = process, limit, 0.0
+        self.overran: tuple[Status, str] | None = None
+        self.done = threading.Event()
+        threading.Thread(target=self._look, daemon=True).start()
+
+    def _look(self) -> None:
+        begin, passed = time.monotonic(), 0.0
+        while not self.done.wait(min(max(_GLANCES[0], _SHARE * passed), _GLANCES[1])):
+            times = processor_times(self.process, of_ended=True)
+            used, passed = sum(times.values()), time.monotonic() - begin
+            self.memory = max(self.memory, *map(peak_memory, times), 0.0)
+            if used >= self.limit:
+                self.overran = "timed out", f"ended after {self.limit:g} s of processor time, the time limit"
+            elif passed >= CLOCK * self.limit:
+                why = f"it waited, or the machine was busy: {used:.3g} s of processor time in {passed:.3g} s"
+                self.overran = "stalled", why
+            if self.overran is not None:
+                _kill(self.process)
+                return
+
+
+def _last_line(printed: IO[bytes]) -> str:
+    """The last line that was printed, empty without one."""
+    size = printed.seek(0, os.SEEK_END)
+    printed.seek(max(0, size - _TAIL))
+    lines = [line for line in printed.read().decode(errors="replace").splitlines() if line.strip()]
+    return lines[-1].strip()[-300:] if lines else ""

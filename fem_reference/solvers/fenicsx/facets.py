@@ -1,0 +1,132 @@
+"""Facets of a body's surface as it deforms: exact polynomials of their nodes, points on them, and the nearest places on them."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import basix
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Cells
+from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
+
+_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and those that places far beyond the edges get
+_LONGEST, _SMALL = 0.5, 1e-14  # steps of it, in reference coordinates
+_BALL = 1.25  # a facet is within so many times the distance of its farthest node from their mean
+
+
+@dataclass(frozen=True, eq=False)
+class FacetPlaces:
+    """Places on n facets: the reference coordinates ``at`` (n, 2), the values ``basis`` (n, k) of the functions of the nodes and
+    their ``slopes`` (n, 2, k), the position ``point`` (n, 3) [mm], the ``tangents`` (n, 2, 3), the outward unit ``normal`` (n, 3),
+    and the second derivatives of the position along the normal, ``bend`` (n, 2, 2) [mm].
+    """
+
+    at: Floats
+    basis: Floats
+    slopes: Floats
+    point: Floats
+    tangents: Floats
+    normal: Floats
+    bend: Floats
+
+    @property
+    def metric(self) -> Floats:
+        """The products (n, 2, 2) [mm2] of the tangents."""
+        return self.tangents @ np.swapaxes(self.tangents, 1, 2)
+
+    def __getitem__(self, some: Ints) -> "FacetPlaces":
+        return FacetPlaces(*(getattr(self, column.name)[some] for column in fields(self)))
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """The m facets of a part of the surface, with k nodes each: their unknowns ``dofs`` (m, k, 3), rest positions ``rest``
+    (m, k, 3) [mm], the sign ``outward`` (m,) of the cross product of their tangents, and the ``element`` of their functions.
+    """
+
+    dofs: Ints
+    rest: Floats
+    outward: Floats
+    element: Any
+
+    def __getitem__(self, some: Ints) -> "Facets":
+        return replace(self, dofs=self.dofs[some], rest=self.rest[some], outward=self.outward[some])
+
+    def nodes(self, unknowns: Floats) -> Floats:
+        """The present positions (m, k, 3) [mm] of the nodes."""
+        return np.asarray(self.rest + unknowns[self.dofs])
+
+    def rule(self, degree: int) -> tuple[Floats, Floats]:
+        """Points (q, 2) and weights (q,) of a quadrature of ``degree`` on the reference facet."""
+        points, weights = basix.make_quadrature(self.element.cell_type, degree)
+        return np.asarray(points), np.asarray(weights)
+
+    def places(self, nodes: Floats, which: Ints, at: Floats) -> FacetPlaces:
+        """The places ``at`` (n, 2) on the facets ``which`` (n,), whose ``nodes`` (m, k, 3) [mm] are given."""
+        tables, nodes = self.element.tabulate(2, at)[..., 0], nodes[which]
+        point, u, v, uu, uv, vv = np.einsum("dnk,nki->dni", tables, nodes)
+        across = np.cross(u, v) * self.outward[which, None]
+        normal = across / np.linalg.norm(across, axis=1)[:, None]
+        bends = [np.einsum("ni,ni->n", second, normal) for second in (uu, uv, uv, vv)]
+        bend = np.stack(bends, axis=1).reshape(-1, 2, 2)
+        slopes = np.swapaxes(tables[1:3], 0, 1)
+        return FacetPlaces(at, tables[0], slopes, point, np.stack([u, v], axis=1), normal, bend)
+
+    def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
+        """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
+        Newton's method from their middles; only roughly where these are far beyond the edges.
+        """
+        middle = np.asarray(basix.geometry(self.element.cell_type)).mean(axis=0)
+        at, going = np.tile(middle, (len(which), 1)), np.arange(len(which))
+        for i in range(_ITERATIONS):
+            if not len(going):
+                break
+            place = self.places(nodes, which[going], at[going])
+            away = points[going] - place.point
+            gap = np.einsum("ni,ni->n", away, place.normal)
+            curved = place.metric - gap[:, None, None] * place.bend
+            convex = (np.linalg.det(curved) > 0) & (np.trace(curved, axis1=1, axis2=2) > 0)
+            matrix = np.where(convex[:, None, None], curved, place.metric)
+            step = np.linalg.solve(matrix, place.tangents @ away[:, :, None])[:, :, 0]
+            longest = np.abs(step).max(axis=1)
+            at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
+            going = going[(longest > _SMALL) & ((i < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]
+        return self.places(nodes, which, at)
+
+    def beyond(self, at: Floats) -> Floats:
+        """The distance (n,) of reference coordinates ``at`` (n, 2) from the reference facet, 0 inside it."""
+        u, v = at.T
+        triangle = self.element.cell_type == basix.CellType.triangle
+        far = u + v - 1 if triangle else np.maximum(u, v) - 1
+        return np.asarray(np.maximum(np.maximum(-np.minimum(u, v), far), 0.0))
+
+    @staticmethod
+    def balls(nodes: Floats) -> tuple[Floats, Floats]:
+        """The middles (m, 3) and radii (m,) [mm] of balls around facets with ``nodes`` (m, k, 3)."""
+        middles = nodes.mean(axis=1)
+        return middles, _BALL * np.linalg.norm(nodes - middles[:, None], axis=2).max(axis=1)
+
+
+def facets_of(displacement: Displacement, mesh: Cells, facets: Ints) -> Facets:
+    """The ``facets`` of a ``mesh`` on one rank, in the order of their numbers there."""
+    space, msh = displacement.space, displacement.space.mesh
+    cells, back = msh.topology.connectivity(2, 3), msh.topology.connectivity(3, 2)
+    beside = np.array([cells.links(facet)[0] for facet in facets], np.int64)
+    numbers = [int(np.flatnonzero(back.links(cell) == facet)[0]) for cell, facet in zip(beside, facets, strict=True)]
+    whole: Any = space.element.basix_element
+    side = "triangle" if mesh.kind == "tetrahedron" else "quadrilateral"
+    element = lagrange(side, whole.degree)
+    corners, topology = basix.geometry(basix.CellType[mesh.kind]), basix.topology(basix.CellType[mesh.kind])[2]
+    local = np.empty((len(topology), element.dim), np.int64)  # the nodes of each side of a cell
+    for number, vertices in enumerate(topology):
+        first, *others = corners[vertices[:3]]
+        places = first + element.points @ np.stack([other - first for other in others])
+        local[number] = [int(np.argmin(np.linalg.norm(whole.points - place, axis=1))) for place in places]
+    nodes = space.dofmap.list[beside]
+    own = np.take_along_axis(nodes, local[numbers], axis=1)
+    places = space.tabulate_dof_coordinates()
+    found = Facets(displacement.dofs[own], places[own], np.ones(len(own)), element)
+    middle = found.places(found.rest, np.arange(len(own)), np.full((len(own), 2), 1 / 3))
+    outward = np.einsum("ni,ni->n", middle.point - places[nodes].mean(axis=1), middle.normal)
+    return replace(found, outward=np.sign(outward))

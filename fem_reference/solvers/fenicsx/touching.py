@@ -1,0 +1,111 @@
+"""Contact between parts of the surface of a body: forces on the nodes of both sides, and their tangent.
+
+Points of quadrature on either side meet the nearest place on the facets of the other, as these are now, with half their area: so
+both sides are alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
+"""
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.problems.body import Body
+from fem_reference.solvers.common.state_checks import Trouble
+from fem_reference.solvers.fenicsx.facets import facets_of
+from fem_reference.solvers.fenicsx.forms import Form
+from fem_reference.solvers.fenicsx.meshes import Displacement
+from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
+
+
+class TouchingForces:
+    """Contact between the parts of the surface that the ``touching`` of a body names, on one rank. It follows the present unknowns
+    by itself.
+    """
+
+    def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
+        """ArithmeticError where parts overlap at rest by more than the smoothing."""
+        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
+        for law in body.touching:
+            low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
+            self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
+        self.now = list[tuple[Met, PressedPoints]]()
+        self.seen = np.full(len(self.unknowns.x.array), np.nan)
+        self.look()
+        for one, (met, _) in zip(self.passes, self.now, strict=True):
+            if (depth := -float(met.gap.min(initial=0.0))) > one.law.smoothing:
+                raise ArithmeticError(f'"{one.law.one}" and "{one.law.other}" overlap by {depth:.3g} mm')
+
+    def look(self) -> None:
+        """Find the contact at the present unknowns, unless they are those of the last search."""
+        if not np.array_equal(self.seen, self.unknowns.x.array):
+            with self.spent.on("contact"):
+                self.seen = np.array(self.unknowns.x.array)
+                lasts = [*(met for met, _ in self.now), *(None for _ in self.passes if not self.now)]
+                mets = [
+                    one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
+                ]
+                self.now = [(met, one.pressed(met)) for one, met in zip(self.passes, mets, strict=True)]
+
+    def add_residual(self, residual: Floats, moves: Floats | None) -> None:
+        """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
+        self.look()
+        for _, one in self.now:
+            np.subtract.at(residual, one.dofs, one.forces[:, None] * one.rows[:, 0])
+        if moves is not None and moves.any():
+            residual += self.tangent() @ moves
+
+    def tangent(self) -> csr_array:
+        """The derivative (n, n) of the residual by the unknowns."""
+        self.look()
+        size, found = len(self.seen), csr_array((len(self.seen), len(self.seen)))
+        for _, one in self.now:
+            count, five, width = one.rows.shape
+            columns = np.broadcast_to(one.dofs[:, None], one.rows.shape).ravel()
+            starts = np.arange(0, count * five * width + 1, width)
+            rows, scaled = (
+                csr_array((values.ravel(), columns, starts), shape=(count * five, size))
+                for values in (one.rows, one.second @ one.rows)
+            )
+            found += rows.T @ scaled
+        found.sort_indices()
+        return csr_array(found)
+
+    def forces(self) -> dict[str, tuple[Floats, Floats]]:
+        """The force (3,) [N] of each part on the other, by name, and its moment (3,) [N mm] about the origin."""
+        self.look()
+        found = dict[str, tuple[Floats, Floats]]()
+        for one, (met, contact) in zip(self.passes, self.now, strict=True):
+            forces = contact.forces[:, None] * met.there.normal  # on the points
+            for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
+                force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
+                pull = sign * forces
+                found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
+        return found
+
+    def scalars(self) -> dict[str, float]:
+        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
+        ``touching_area`` [mm2], the mean of both sides; and the number of points under pressure, ``touching_points``.
+        """
+        self.look()
+        pairs = list(zip(self.passes, self.now, strict=True))
+        gaps = np.concatenate([met.gap for met, _ in self.now])
+        return {
+            "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
+            "touching_pressure": max(float(one.law.pressure(met.gap)[0].max(initial=0.0)) for one, (met, _) in pairs),
+            "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
+            "touching_points": float(len(gaps)),
+        }
+
+    def trouble(self, before: Floats, /) -> Trouble | None:
+        """Diverged where a point went through the other part since the unknowns ``before`` (n,)."""
+        self.look()
+        for one, (met, _) in zip(self.passes, self.now, strict=True):
+            if len(lost := one.through(before, self.seen, met)):
+                where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
+                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} went through the other side")
+        return None
+
+
+def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:
+    """The contact between parts of the surface of a ``body``, None where it names none."""
+    return TouchingForces(body, form, displacement, spent) if body.touching else None

@@ -1,0 +1,148 @@
+"""Contact of deformable bodies: two blocks with unrelated meshes, and a ball on a large body, both elastic (Hertz)."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body, Cells, Prescribed
+from fem_reference.problems.paths import Affine
+from fem_reference.problems.touching import Touching
+from fem_reference.runs.store import Frame
+from fem_reference.verification.contact import APPROACH, BULK, CORE, FAR, MU, RADIUS
+from fem_reference.verification.parts import NO_GRADIENT, SLOW, clamped, control, find, neo_hooke
+
+SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], and [MPa/mm]
+BALL_STIFFNESS, FLAT = 2.0, 2.0  # [MPa/mm], and the distance [mm] at which the ball's curvature ends
+
+
+def _mirrors(*pieces: str) -> tuple[Prescribed, ...]:
+    """The planes x = 0 and y = 0 of all ``pieces`` as mirrors."""
+    named = [(f"{piece}_{axis}0", i) for piece in pieces for i, axis in enumerate("xy")]
+    return tuple(one for name, axis in named for one in clamped(name, components=(axis,)))
+
+
+def _lowered(name: str, path: float, components: tuple[int, ...]) -> Prescribed:
+    return Prescribed(name, name, components, Affine(NO_GRADIENT, (0.0, 0.0, -path)))
+
+
+def blocks(lab: Lab, stiffness: float) -> Finding:
+    """The force [N] between two blocks with unrelated meshes, as high as wide together, as the upper one is moved down."""
+    low, high = (shapes.box(counts, (1.0, 1.0, 0.5), "tetrahedron") for counts in ((3, 3, 2), (4, 5, 2)))
+    mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0, 0, 0.5])})
+    moved = _lowered("high_z1", TRAVEL, (2,))
+    prescribed = (*_mirrors("low", "high"), *clamped("low_z0", components=(2,)), moved)
+    law = Touching("low_z1", "high_z0", stiffness, 0.002)
+    body = Body(mesh, neo_hooke(MU, SOFT), prescribed, (0.0, 1.0), touching=(law,))
+    state = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-11).last
+    # On an area of 1 mm2.
+    most = state.scalars["touching_pressure"] / -float(state.forces["high_z1"][2])
+    return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} of the mean one")
+
+
+def known_blocks() -> float:
+    """The force of a block of both, in series with the spring of the contact."""
+    force = partial(find("loads").squeeze_force, MU, SOFT, area=1.0)
+
+    def apart(stretch: float) -> float:
+        return float(force(stretch=stretch)) + BLOCK_STIFFNESS * (stretch - (1 - TRAVEL))
+
+    return float(force(stretch=brentq(apart, 1 - TRAVEL, 1.0, xtol=1e-15)))
+
+
+def _quarter(n: int) -> Cells:
+    """A quarter of a large body, z >= 0, of cells that grow from ``n`` in its core; its region "near" is the middle of z0."""
+    mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
+    flat = mesh.facets["z0"]
+    near = np.linalg.norm(mesh.points[flat][..., :2], axis=2).max(axis=1) < FLAT
+    return replace(mesh, facets=mesh.facets | {"near": flat[near]})
+
+
+def pressed(lab: Lab, n: int, radius: float) -> Frame:
+    """A quarter of a flat body below z = 0, and of one above, with a bump of a ``radius`` [mm] where it touches the other, whose
+    far ends approach each other by APPROACH.
+    """
+    low, high = _quarter(n), _quarter(n + 1)
+    away = np.hypot(high.points[:, 0], high.points[:, 1])
+    beyond = FLAT**2 / (2 * radius) + FLAT**2 / radius * np.tanh((away - FLAT) / FLAT)  # far from the contact
+    bump = np.where(away < FLAT, away**2 / (2 * radius), beyond)
+    high = replace(high, points=high.points + bump[:, None] * [0, 0, 1])
+    turned = {{"x0": "y0", "y0": "x0"}.get(name, name): facets for name, facets in low.facets.items()}
+    low = replace(low, points=low.points[:, [1, 0, 2]] * [1, 1, -1], facets=turned)
+    prescribed = (*_mirrors("low", "high"), *clamped("low_outer"), _lowered("high_outer", APPROACH, (0, 1, 2)))
+    law = Touching("low_near", "high_near", BALL_STIFFNESS, 5e-4)
+    mesh = shapes.joined({"low": low, "high": high})
+    body = Body(mesh, neo_hooke(MU, BULK), prescribed, (0.0, 1.0), touching=(law,))
+    return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
+
+
+# As of a rigid ball in ``contact``.
+READINGS: dict[str, Callable[[Frame], float]] = {
+    "force": lambda state: 4 * float(state.forces["low_near on high_near"][2]),
+    "contact_radius": lambda state: (
+        8 / 3 * float(-state.moments["low_near on high_near"][1] / state.forces["low_near on high_near"][2])
+    ),
+}
+
+
+def ball(lab: Lab, reading: str, radius: float) -> Finding:
+    """A reading of the pressed bodies."""
+    state = pressed(lab, 3, radius)
+    return Finding(
+        READINGS[reading](state), note=f"they overlap by {1000 * state.scalars['touching_depth']:.1f} micrometres"
+    )
+
+
+def known_ball(name: str) -> float:
+    """The closed form for an elastic ball on a body of the same material."""
+    young, poisson = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
+    hertz = find("hertz")
+    flat, round_ = (hertz.Side(radius, young, poisson) for radius in (math.inf, RADIUS))
+    # Two compliances of the same size: half the force of a rigid ball at the same approach.
+    return float(getattr(hertz.Hertz(flat, round_, hertz.force_at(RADIUS, young, poisson, APPROACH) / 2), name))
+
+
+ENTRIES = (
+    Entry(
+        name="blocks_p2_p1",
+        group="contact",
+        title="Two blocks with unrelated meshes pressed together: their force",
+        unit="N",
+        measure=blocks,
+        given={"stiffness": BLOCK_STIFFNESS},
+        **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
+        truth=known_blocks,
+        within=2e-4,
+        relative=True,
+        because="points of either mesh do not integrate the other's functions exactly: 6e-5 remain, and 2 % of the pressure",
+        kind="closed form",
+        source="validation/loads.py: the squeeze of a block, in series with the spring",
+    ),
+    *(
+        Entry(
+            name=f"hertz_elastic_{name}",
+            group="contact",
+            title=f"An elastic ball pressed against a large body of the same material: {words}",
+            unit=unit,
+            measure=ball,
+            given={"reading": reading, "radius": RADIUS},
+            **control("a ball of twice the radius", radius=2 * RADIUS),
+            truth=partial(known_ball, reading),
+            within=0.02,
+            relative=True,
+            because="the mesh and the overlap of both leave about 1 %, strains of a tenth and the end of the bodies less",
+            kind="closed form",
+            source="Hertz 1882; validation/hertz.py",
+            **SLOW,
+        )
+        for name, words, unit, reading in (
+            ("force", "its force", "N", "force"),
+            ("radius", "the radius of the contact", "mm", "contact_radius"),
+        )
+    ),
+)

@@ -1,0 +1,123 @@
+"""Pairs of triangles that may intersect: none that does is left out, few that do not are kept, with and without a compiler."""
+
+import itertools
+
+import numpy as np
+import pytest
+import shapes
+from igl import predicates
+from scipy.spatial.transform import Rotation
+
+from fem_reference.foundations import native
+from fem_reference.foundations.mesh import Surface
+from fem_reference.geometry import near_pairs as module
+from fem_reference.geometry.intersections import crossings, self_crossings
+from fem_reference.geometry.near_pairs import near_pairs
+
+FLAT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
+
+
+def pairs(one: Surface, other: Surface) -> set[tuple[int, ...]]:
+    found = near_pairs(one, other)
+    assert found is not None
+    assert len(np.unique(found, axis=0)) == len(found)  # each once
+    return set(map(tuple, found.tolist()))
+
+
+def crumpled(seed: int, share: float) -> Surface:
+    """A sphere at the hip, of which a ``share`` of the vertices is moved by half its radius, turned at random."""
+    rng, ball = np.random.default_rng(seed), shapes.sphere(2, 30.0)
+    moved = ball.points + 15 * (rng.random((len(ball.points), 1)) < share) * rng.uniform(-1, 1, ball.points.shape)
+    return ball.moved_to(Rotation.random(rng=rng).apply(moved) + [146, 238, -431])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
+def test_of_crumpled_surfaces_none_that_libigl_finds_to_cross_is_left_out(share) -> None:
+    """Exact predicates of libigl on all triangles, whose pairs that touch at a corner or along an edge are no crossings."""
+    for seed in range(4):
+        given = crumpled(seed, share)
+        kept, (_, exact, _) = pairs(given, given), predicates.find_self_intersections(given.points, given.triangles)
+        assert {tuple(sorted(pair)) for pair in exact.tolist()} - {tuple(sorted(pair)) for pair in kept} == set()
+        if not share:
+            assert kept == set()  # of 320 triangles, each of which touches twelve others
+
+
+def test_of_two_surfaces_none_that_touches_is_left_out() -> None:
+    rng = np.random.default_rng(2)
+    # Sizes from 0.01 to 10, so that triangles reach over many cells or lie in one.
+    soups = [
+        Surface(
+            (
+                rng.uniform(-5, 5, (80, 1, 3)) + 10 ** rng.uniform(-2, 1, (80, 1, 1)) * rng.normal(size=(80, 3, 3))
+            ).reshape(-1, 3),
+            np.arange(240).reshape(80, 3),
+        )
+        for _ in range(2)
+    ]
+    _, exact, _ = predicates.find_intersections(*(array for one in soups for array in (one.points, one.triangles)))
+    exact = set(map(tuple, exact.tolist()))
+    kept = pairs(*soups)
+    assert len(exact) > 50
+    assert exact <= kept
+    assert len(kept) < 3 * len(exact)
+    assert {pair[::-1] for pair in pairs(*soups[::-1])} == kept
+
+
+@pytest.mark.parametrize("gap", [1e-6, 0.0, -1e-13])
+def test_a_gap_of_a_nanometre_is_certain_and_what_touches_is_kept(gap) -> None:
+    plate = Surface(FLAT, np.array([[0, 1, 2]]))
+    beside = [] if gap > 0 else [[1.0 + gap, 1.0 + gap, 0.0]]  # at an edge
+    for tip, apart in itertools.product(([0.5, 0.5, gap], *beside), ([0.0, 0, 3], [146, 238, -431])):
+        spike = np.array([tip, [1.4, 1.5, 3], [1.6, 1.4, 3]])
+        kept = pairs(plate.moved_to(plate.points + apart), Surface(spike + apart, np.array([[0, 1, 2]])))
+        assert kept == (set() if gap > 0 else {(0, 0)})
+
+
+def test_triangles_in_one_plane_that_overlap_or_touch_are_kept_and_neighbours_are_not() -> None:
+    points = np.concatenate(
+        [FLAT, [[0.5, 0.5, 0], [3, 1, 0], [1, 3, 0], [-1, -1, 0], [2, 2, 0], [-2, 0, 0], [0, -2, 0]]]
+    )
+    over, edge, corner, beside = [3, 4, 5], [1, 7, 2], [0, 8, 9], [0, 3, 4]
+    both = [Surface(points, np.array([[0, 1, 2], other])) for other in (over, edge, corner, beside)]
+    assert [len(pairs(one, one)) for one in both] == [1, 0, 0, 1]
+    # An edge apart from the common corner goes through the other triangle, or ends a nanometre from it.
+    for height, count in ((0.5, 1), (1e-9, 1), (-1e-6, 0)):
+        through = Surface(np.concatenate([FLAT, [[1.0, 0.4, -height], [1, 0.6, 1]]]), np.array([[0, 1, 2], [0, 3, 4]]))
+        assert len(pairs(through, through)) == count
+        assert len(self_crossings(through)) == count
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-60, 1e100, 1e300])
+def test_of_sizes_whose_powers_are_no_numbers_nothing_is_certain(size) -> None:
+    rng = np.random.default_rng(0)
+    soup = Surface(size * rng.uniform(-1, 1, (30, 3)), np.arange(30).reshape(10, 3))
+    unit = Surface(soup.points / size, soup.triangles)
+    assert pairs(unit, unit) <= pairs(soup, soup)
+    assert len(self_crossings(unit)) > 0
+
+
+def test_degenerate_and_empty_surfaces() -> None:
+    point = Surface(np.zeros((3, 3)), np.array([[0, 1, 2]]))
+    nothing = Surface(np.zeros((3, 3)), np.zeros((0, 3)))
+    assert pairs(point, Surface(np.zeros((3, 3)), np.array([[0, 1, 2]]))) == {(0, 0)}
+    assert pairs(point, nothing) == pairs(nothing, point) == pairs(nothing, nothing) == pairs(point, point) == set()
+    lost = Surface(np.full((3, 3), np.nan), np.array([[0, 1, 2]]))
+    assert near_pairs(point, lost) is None
+
+
+def test_without_a_compiler_the_answers_are_the_same(monkeypatch) -> None:
+    given, other = crumpled(0, 0.3), crumpled(1, 0.0)
+    with_it = self_crossings(given), crossings(given, other)
+
+    def missing(*_: object) -> None:
+        raise OSError("cc")
+
+    monkeypatch.setattr(native, "library", missing)
+    module._code.cache_clear()
+    try:
+        assert near_pairs(given, given) is None
+        for one, two in zip(with_it, (self_crossings(given), crossings(given, other)), strict=True):
+            assert len(one) > 10
+            assert set(map(tuple, one.tolist())) == set(map(tuple, two.tolist()))
+    finally:
+        module._code.cache_clear()

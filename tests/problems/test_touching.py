@@ -1,0 +1,40 @@
+"""Parts of the surface that may touch: the law, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem_reference as fr
+from fem_reference.problems.checks import check
+
+LAW = fr.Touching("low_z1", "high_z0", 2.0, 0.1)
+
+
+def body(*laws: fr.Touching) -> fr.Body:
+    high = fr.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+    mesh = fr.joined({"low": fr.box((1, 1, 2), (1.0, 1.0, 1.0), "tetrahedron"), "high": high})
+    return fr.Body(mesh, (fr.make_effect("neo_hooke", mu=0.01),), (), (0.0, 1.0), touching=laws)
+
+
+def test_the_pressure_is_that_of_bones() -> None:
+    # k (d - g)^2 / 4d within the smoothing, k times the depth beyond it; its slope by hand.
+    pressure, slope = LAW.pressure(np.array([0.2, 0.1, 0.0, -0.1, -0.3, np.nan]))
+    assert pressure == pytest.approx([0, 0, 0.05, 0.2, 0.6, np.nan], abs=1e-15, nan_ok=True)
+    assert slope[:5] == pytest.approx([0, 0, -1, -2, -2], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (replace(LAW, stiffness=0.0), r"touching\[1\].stiffness: got 0.0, want a number above 0"),
+        (replace(LAW, smoothing=float("nan")), r"touching\[1\].smoothing: got nan"),
+        (replace(LAW, other="low_z0"), r'touching\[1\]: got "low_z1" and "low_z0" on one connected piece'),
+        (replace(LAW, one="low"), r'on: got "low", want a region of the body'),
+        ("low_z1", r"touching\[1\]: got str .*, want Touching records"),
+    ],
+)
+def test_what_is_wrong_is_refused(law, message) -> None:
+    check(body(LAW), "P1")
+    with pytest.raises(fr.InputError, match=message):
+        check(body(LAW, law), "P1")

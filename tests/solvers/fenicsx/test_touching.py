@@ -1,0 +1,131 @@
+"""Contact between parts of the surface: forces and moments balance, both sides are alike, and nothing passes unseen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.geometry.rigid_bodies import HalfSpace
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body, Cells, Prescribed
+from fem_reference.problems.contact import ContactBone, ContactLaw
+from fem_reference.problems.paths import Affine
+from fem_reference.problems.touching import Touching
+from fem_reference.solvers import fenicsx, scikit_fem
+from fem_reference.verification import parts
+
+pytestmark = pytest.mark.slow
+
+LAW = Touching("low_z1", "high_z0", 1.0, 0.02)
+SOFT = parts.neo_hooke(0.01, 10.0)
+
+
+def placed(mesh: Cells, *shift: float, turn=((1.0, 0, 0), (0, 1, 0), (0, 0, 1))) -> Cells:
+    """The mesh turned and then moved."""
+    return replace(mesh, points=mesh.points @ np.array(turn) + shift)
+
+
+def block(counts: tuple[int, int, int], size: tuple[float, float, float] = (1.0, 1.0, 0.5)) -> Cells:
+    return shapes.box(counts, size, "hexahedron")
+
+
+def moved(*shift: float) -> Affine:
+    """The path from rest to a ``shift`` [mm] at frame 1."""
+    return Affine(parts.NO_GRADIENT, shift)
+
+
+def pair(low: Cells, high: Cells, *shift: float, law: Touching = LAW) -> Body:
+    """Two pieces, the lower one clamped below, the upper one moved at its top."""
+    prescribed = (*parts.clamped("low_z0"), Prescribed("top", "high_z1", (0, 1, 2), moved(*shift)))
+    return Body(shapes.joined({"low": low, "high": high}), SOFT, prescribed, (0.0, 1.0), touching=(law,))
+
+
+def at_rest(_: float) -> np.ndarray:
+    return np.eye(4)
+
+
+def solved(lab, body: Body, **settings):
+    return lab.solve(body, "Q1/P0", **({"first_step": 0.5, "residual": 1e-12} | settings))
+
+
+def test_pieces_of_one_mesh_do_not_feel_each_other_without_contact(fem_lab) -> None:
+    low, high = block((2, 2, 1)), placed(block((1, 1, 1)), 0.1, 0.2, 0.4)  # they overlap
+    top = Prescribed("top", "z1", (0, 1, 2), moved(0.1, 0.0, -0.1))
+    alone = Body(high, SOFT, (top, *parts.clamped("z0")), (0.0, 1.0))
+    clamped = replace(pair(low, high, 0.1, 0.0, -0.1), touching=())
+    clamped = replace(clamped, prescribed=(*clamped.prescribed, *parts.clamped("high_z0")))
+    both, one = solved(fem_lab, clamped).last, solved(fem_lab, alone).last
+    assert both.points[: len(low.points)] == pytest.approx(low.points, abs=1e-12)
+    assert both.points[len(low.points) :] == pytest.approx(one.points, abs=1e-12)
+    assert both.forces["top"] == pytest.approx(one.forces["top"], abs=1e-12)
+
+
+def test_forces_and_moments_balance_to_rounding(fem_lab) -> None:
+    # Askew, off centre, and with unrelated meshes; the residual of Newton's method is 1e-12 N, arms are 1 mm.
+    turn = np.array([[np.cos(0.3), np.sin(0.3), 0], [-np.sin(0.3), np.cos(0.3), 0], [0, 0, 1]])
+    high = placed(block((2, 1, 1), (0.6, 0.5, 0.4)), 0.3, 0.2, 0.51, turn=turn)
+    state = solved(fem_lab, pair(block((3, 3, 1)), high, 0.03, 0.02, -0.1)).last
+    up, down = state.forces["low_z1 on high_z0"], state.forces["high_z0 on low_z1"]
+    assert up[2] > 1e-3
+    assert up + down == pytest.approx([0, 0, 0], abs=1e-17)
+    moments = state.moments["low_z1 on high_z0"] + state.moments["high_z0 on low_z1"]
+    assert moments == pytest.approx([0, 0, 0], abs=1e-16)
+    assert state.forces["top"] + up == pytest.approx([0, 0, 0], abs=1e-11)
+    assert state.moments["low_z0"] + state.moments["high_z0 on low_z1"] == pytest.approx([0, 0, 0], abs=1e-11)
+    assert 0 < state.scalars["touching_depth"] < 0.02
+    # Of the lower side by points up to 0.1 mm apart, half of the mean.
+    assert state.scalars["touching_area"] == pytest.approx(0.3, rel=0.2)
+
+
+def test_two_mirrored_blocks_are_one_on_a_smooth_plate_of_twice_the_stiffness(fem_lab) -> None:
+    # The gap between the two is twice that to the plane of the mirror, and so is its smoothing. The surfaces in contact are not
+    # quite flat: to the square of their slope, 0.01, the gap is another.
+    half = block((2, 2, 1))
+    other = replace(half, points=half.points * [1, 1, -1])
+    ends = [Prescribed(f"{i}", f"{i}_z1", (0, 1, 2), moved(0.0, 0.0, z)) for i, z in (("a", -0.1), ("b", 0.1))]
+    law = Touching("a_z0", "b_z0", 1.0, 0.02)
+    body = Body(shapes.joined({"a": half, "b": other}), SOFT, tuple(ends), (0.0, 1.0), touching=(law,))
+    plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), at_rest)
+    alone = Body(half, SOFT, (replace(ends[0], on="z1"),), (0.0, 1.0))
+    one = replace(alone, contact=ContactLaw("z0", 2.0, 0.01), bones=(plate,))
+    two, single = solved(fem_lab, body).last, solved(fem_lab, one).last
+    assert single.forces["a"][2] < -1e-3
+    assert two.forces["a"] == pytest.approx(single.forces["a"], rel=1e-4, abs=1e-11)
+    assert two.points[: len(half.points)] == pytest.approx(single.points, abs=3e-5)
+
+
+def test_what_is_far_away_costs_and_does_nothing(fem_lab) -> None:
+    far = placed(block((1, 1, 1)), 0.0, 0.0, 3.0)
+    state = solved(fem_lab, pair(block((1, 1, 1)), far, 0.0, 0.0, -0.2)).last
+    assert not state.forces["low_z1 on high_z0"].any()
+    assert [state.scalars[f"touching_{name}"] for name in ("depth", "pressure", "area", "points")] == [0, 0, 0, 0]
+    assert state.points[: len(block((1, 1, 1)).points)] == pytest.approx(block((1, 1, 1)).points, abs=1e-15)
+
+
+@pytest.mark.parametrize("face", ["z1", "z0"])
+def test_nothing_passes_a_thin_sheet_within_a_step(fem_lab, face) -> None:
+    # In one step the block is moved to the other side of the sheet, where nothing is in contact. The back of the sheet faces the
+    # same way as the block: it is not in the way of its points, but has points of its own.
+    sheet, ball = block((4, 4, 1), (1.0, 1.0, 0.02)), placed(block((2, 2, 1), (0.4, 0.4, 0.2)), 0.3, 0.3, 0.5)
+    body = pair(sheet, ball, 0.0, 0.0, -1.5, law=replace(LAW, one=f"low_{face}"))
+    body = replace(body, prescribed=(*parts.clamped("low_x0", "low_x1"), *body.prescribed[1:]))
+    outcome = solved(fem_lab, body, first_step=1.0, smallest_step=0.4).outcome
+    assert outcome.status != "converged"
+    assert "went through the other side" in outcome.message
+
+
+def test_overlap_at_rest_is_refused(fem_lab) -> None:
+    outcome = solved(fem_lab, pair(block((1, 1, 1)), placed(block((1, 1, 1)), 0.0, 0.0, 0.4), 0.0, 0.0, 0.1)).outcome
+    assert outcome.status == "diverged"
+    assert 'at rest: "low_z1" and "high_z0" overlap by 0.1 mm' in outcome.message
+
+
+def test_what_is_not_supported_is_refused() -> None:
+    body = pair(block((1, 1, 1)), placed(block((1, 1, 1)), 0.0, 0.0, 0.5), 0.0, 0.0, -0.1)
+    with pytest.raises(InputError, match="touching: got parts that touch, want a body without"):
+        scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(element="Q1/P0"))
+    with pytest.raises(InputError, match='linear_solver: got "multigrid"'):
+        fenicsx.solve_body(body, fenicsx.BodySettings(element="Q2/Q1", linear_solver="multigrid"))
+    with fenicsx.session(ranks=2) as two, pytest.raises(InputError, match="ranks: got 2, want 1"):
+        two.solve(body, fenicsx.BodySettings(element="Q1/P0"))

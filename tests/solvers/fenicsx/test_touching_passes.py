@@ -1,0 +1,113 @@
+"""Forces of contact between parts of a surface are the slope of its energy, and their tangent is theirs, on curved facets too."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
+
+from mpi4py import MPI
+
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body
+from fem_reference.problems.touching import Touching
+from fem_reference.solvers.fenicsx import meshes
+from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.touching import TouchingForces
+
+K, D = 2.0, 0.05
+KINDS = {
+    "P1/P1": ("tetrahedron", 1),
+    "P2/P1": ("tetrahedron", 1),
+    "Q1/P0": ("hexahedron", 1),
+    "Q2/Q1": ("hexahedron", 2),
+}
+
+
+def crumpled(element: str) -> tuple[TouchingForces, meshes.Displacement]:
+    """Two boxes on each other with unrelated meshes, each node of them moved somewhere near."""
+    kind, degree = KINDS[element]
+    low, high = (
+        shapes.warped_box((2, 2, 1), (1.0, 1.0, 0.5), kind, degree),
+        shapes.box((1, 2, 1), (1.1, 1.2, 0.5), kind, degree),
+    )
+    high.points[:] += [-0.05, -0.1, 0.49]
+    mesh = shapes.joined({"low": low, "high": high})
+    law = Touching("low_z1", "high_z0", K, D)
+    local = meshes.distribute(MPI.COMM_SELF, mesh)
+    regions = dict(zip(mesh.facets, meshes.local_facets(local, mesh.facets.values()), strict=True))
+    displacement = meshes.Displacement(meshes.unknowns(local, element))
+    body = Body(mesh, (), (), (0.0, 1.0), touching=(law,))
+    found = TouchingForces(body, SimpleNamespace(regions=regions), displacement, Spent())
+    dofs = displacement.dofs
+    found.unknowns.x.array[dofs] = 0.02 * np.random.default_rng(1).normal(size=dofs.shape)
+    return found, displacement
+
+
+def energy(contact: TouchingForces) -> float:
+    """The integral of the law's pressure over the gap, summed over the points of both sides."""
+    contact.look()
+    total = 0.0
+    for one, (met, _) in zip(contact.passes, contact.now, strict=True):
+        deep = K * met.gap**2 / 2 + K * D**2 / 6
+        total += one.areas[met.points] @ np.where(met.gap < -D, deep, K * (D - met.gap) ** 3 / (12 * D))
+    return total
+
+
+def residual(contact: TouchingForces) -> np.ndarray:
+    found = np.zeros(len(contact.unknowns.x.array))
+    contact.add_residual(found, None)
+    return found
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_forces_are_the_slope_of_the_energy_and_the_tangent_theirs(element) -> None:
+    contact, displacement = crumpled(element)
+    unknowns, dofs = contact.unknowns.x.array, displacement.dofs
+    forces, tangent = residual(contact), contact.tangent()
+    assert min(len(met.gap) for met, _ in contact.now) > 5
+    assert min(met.gap.min() for met, _ in contact.now) < 0
+    start, direction, step = np.array(unknowns), np.zeros_like(unknowns), 1e-6
+    direction[dofs] = np.random.default_rng(2).normal(size=dofs.shape)
+    ends = []
+    for sign in (1, -1):
+        unknowns[:] = start + sign * step * direction
+        ends.append((energy(contact), residual(contact)))
+    (after, above), (before, below) = ends
+    # Central differences of numbers of the order of 1e-3: the square of the step, and rounding over it.
+    assert (after - before) / (2 * step) == pytest.approx(forces @ direction, abs=1e-9)
+    assert (above - below) / (2 * step) == pytest.approx(tangent @ direction, abs=1e-8)
+    assert abs(tangent - tangent.T).max() < 1e-15
+    # Of the forces on the nodes, which a rigid motion does not change: sum and moment.
+    unknowns[:] = start
+    nodal, places = forces[dofs], displacement.space.tabulate_dof_coordinates() + start[dofs]
+    assert np.abs(nodal).sum() > 1e-3
+    assert nodal.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+    assert np.cross(places, nodal).sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+
+
+def test_points_that_face_the_same_way_do_not_meet() -> None:
+    # The top of the upper box is behind the facets of the lower one once this box is moved into the lower one, far enough.
+    contact, _ = crumpled("Q1/P0")
+    first = contact.passes[0]
+    met = first.met(contact.unknowns.x.array, D)
+    normals = np.einsum("ni,ni->n", met.here.normal, met.there.normal)
+    assert (normals < 0).all()
+    first.other.outward[:] *= -1  # inside out, facets face the same way as the points
+    assert not len(first.met(contact.unknowns.x.array, D).points)
+
+
+def test_a_point_stays_on_its_facet_a_little_beyond_the_edge() -> None:
+    contact, _ = crumpled("P1/P1")
+    one, unknowns = contact.passes[0], contact.unknowns.x.array
+    first = one.met(unknowns, D)
+    assert (one.other.beyond(first.there.at) <= 0.02).all()
+    moves = np.zeros_like(unknowns)
+    moves[one.side.dofs] = [0.01, 0.02, 0.0]  # along the facets, of 0.6 to 1.2 mm
+    fresh, kept = one.met(unknowns + moves, D), one.met(unknowns + moves, D, first)
+    common = np.intersect1d(first.points, np.intersect1d(fresh.points, kept.points))
+    was, by_itself, held = (dict(zip(met.points, met.facets, strict=True)) for met in (first, fresh, kept))
+    changed = [point for point in common if was[point] != by_itself[point]]
+    assert changed
+    assert all(held[point] == was[point] for point in changed)
