@@ -92,8 +92,8 @@ class Between:
         mesh = self.field.mesh
         values = self.field.locator.embed(points).interpolate(mesh, self.field.values)
         slopes = np.linalg.norm(self.field.gradients[mesh.tets].mean(axis=1), axis=1)
-        above = values - self.first if self.first > 0 else np.inf
-        inside = np.minimum(above, self.last - values if self.last < 1 else np.inf)
+        above = np.where(self.first > 0, values - self.first, np.inf)
+        inside = np.minimum(above, np.where(self.last < 1, self.last - values, np.inf))
         return np.asarray(inside / np.average(slopes, weights=tet_volumes(mesh.points, mesh.tets)))
 
 

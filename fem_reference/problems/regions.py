@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fem_reference.effects import Energy, State, region_of
+from fem_reference.effects import Energy, Load, State, region_of
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, check_closed, enclosed_volume, place_of
@@ -20,7 +20,11 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 _LEAST = 0.5  # the least share of laws of a kind at a point
+_REACHED = (
+    0.25  # the least that the greatest share in a region is: where its width is greater than its depth, it is not there
+)
 _ROUNDED = 1e-6  # the error of a sum of shares that is one
+_SURE = 0.99  # below that the greatest share in a region is worth a word
 _SEEN = 1e-3  # an overlap, as a share of the volume, that is worth a word
 
 
@@ -64,6 +68,9 @@ def facts(rest: Setup) -> dict[str, str]:
         return f"{100 * share.mean():.3g} % of the volume, {share.mean() * volume:.4g} mm3"
 
     found = {name: size(share) for name, share in shares.items()}
+    for name, share in shares.items():
+        if (most := float(share.max(initial=0.0))) < _SURE:
+            found[name] += f", with a share of {most:.3g} at most: its width is greater than its depth"
     for (one, a), (other, b) in combinations(shares.items(), 2):
         if (a * b).mean() > _SEEN:
             found[f"{one} and {other} overlap in"] = size(a * b)
@@ -87,8 +94,14 @@ def check(body: Body) -> None:
         share = at.share(region)
         if not (share.min() >= 0 and share.max() <= 1):
             raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
-        if share.max() == 0:
-            raise InputError(f"effects[{i}].in", f'"{region}", which is nowhere in the body', "a part of the body")
+        if (
+            isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets
+        ):  # membranes know shares at corners
+            share = State(F=(), regions=body.shares(body.points_on(effect.on))).share(region)
+        if (most := float(share.max(initial=0.0))) < _REACHED:
+            got = f"whose share is {most:.2g} at most" if most else "which is nowhere in the body"
+            want = f"a share of {_REACHED:g} somewhere: more depth, or less width"
+            raise InputError(f"effects[{i}].in", f'"{region}", {got}', want)
     laws = [effect for effect in body.effects if isinstance(effect, Energy)]
     _check_whole("shape", [law for law in laws if law.moduli().shear], at, points)
     _check_whole("volume", [law for law in laws if law.moduli().bulk and not law.unknowns], at, points)

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.effects import moduli
+from fem_reference.effects import moduli, region_of
 from fem_reference.effects.contact import among
+from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
@@ -36,7 +37,7 @@ def expected(body: Body, settings: Record) -> ExpectedCost:
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
     attached vertex over the frames; ``contact``, how many bones may press; ``bulk_to_shear`` and ``fibres_to_shear`` of the
-    material, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
+    material without its regions, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
     """
     points = setup.surface.points
     moved = [
@@ -46,7 +47,8 @@ def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
         if len(entry.vertices)
     ]
     contact = among(case.effects)
-    shear, bulk, fibres = moduli(case.effects)
+    everywhere = [effect for effect in case.effects if not (region := region_of(effect)) or region.startswith(REST)]
+    shear, bulk, fibres = moduli(everywhere or case.effects)
     pressing = 0 if contact is None else len(case.bone if contact.bones is None else contact.bones)
     return {
         "size": diagonal(points),

@@ -79,7 +79,7 @@ def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Float
     """Angles (a,) [deg] and arms (a, k) [mm], positive in the sense that is wanted, on tetrahedra of ``tet_size`` [mm]."""
     bench = Bench(coarse(casefile.read_muscle(wanted.case), tet_size, wanted.flexion), store)
     run = bench.reference()
-    if run.numbers[-1] / _RAD + 2 * wanted.flexion[0] < _FARTHEST:
+    if run.outcome.status == "denied" or run.numbers[-1] / _RAD + 2 * wanted.flexion[0] < _FARTHEST:
         raise InputError(wanted.case, run.outcome.message, f"a reference that reaches a flexion of {_FARTHEST:g} rad")
     angles, arms = flexion_arms(run, bench)
     return angles, arms if wanted.sense == "flexion" else -arms

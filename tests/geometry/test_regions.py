@@ -47,6 +47,7 @@ def test_a_share_of_the_field_reaches_to_the_attachments():
     assert Blended(Between(FIELD, 0.0, 0.2), 5.0)(at_ends) == pytest.approx([1, 0, 0])
     assert Blended(Between(FIELD, 0.8, 1.0), 5.0)(at_ends) == pytest.approx([0, 1, 0])
     assert Blended(Between(FIELD, 0.4, 0.6), 2.0)(at_ends) == pytest.approx([0, 0, 1])
+    assert Blended(Between(FIELD, 0.0, 1.0), 2.0)(at_ends).tolist() == [1, 1, 1]
 
 
 def test_a_union_is_all_of_its_regions_and_stays_below_one():

@@ -173,6 +173,16 @@ BODY = Body(
         ),
         (WHOLE[:2] + (("incompressible", "tendon", BULK),), end(0.5), "laws of pressure .* with a share of 0 at"),
         (WHOLE, end(-1), r'effects\[1\]\.in: got "tendon", which is nowhere in the body'),
+        (
+            WHOLE,
+            lambda points: 0.1 + 0 * points[:, 2],
+            r'effects\[1\]\.in: got "tendon", whose share is 0.1 at most, want a share of 0.25',
+        ),
+        (
+            (*WHOLE, ("membrane", "tendon", {"on": "z0", "thickness": 0.1, "mu": 1.0})),
+            lambda points: np.where(np.abs(points[:, 2] - 1) < 0.9, 1.0, 0.0),
+            r'effects\[3\]\.in: got "tendon", which is nowhere in the body',
+        ),
         (WHOLE, end(9), r'effects\[0\]\.in: got "not tendon", which is nowhere in the body'),
         (WHOLE, lambda points: points[:, 2], "regions: .*tendon: got shares from .* want from 0 to 1"),
         (WHOLE, lambda points: points[:, 2] * np.nan, "regions: .*tendon: got shares from nan"),

@@ -82,3 +82,12 @@ def test_more_unknowns_take_more_than_in_proportion() -> None:
         ratio = resources.unknowns(large.mesh, other) / resources.unknowns(small.mesh, element)
         longer = seconds(large, other) / seconds(small, element)
         assert ratio < longer < ratio**2
+
+
+def test_the_stiffness_of_a_muscle_is_that_beside_its_tendon(tmp_path: Path) -> None:
+    """1 MPa in the tendon leaves bulk over shear of the belly as it was: 10 MPa over 1 kPa."""
+    region = {"name": "tendon", "width": "2 mm", "attachment": {"name": "origin", "length": "8 mm"}}
+    laws = [{"name": "neo_hooke", "mu": mu, "in": at} for mu, at in (("1 kPa", "not tendon"), ("1 MPa", "tendon"))]
+    changes = {"region": [region], "effect": [*laws, {"name": "incompressible", "bulk": "10 MPa"}]}
+    scene = casefile.read_muscle(small.write(tmp_path / "bar"), changes=changes)
+    assert features(scene, muscle.setup(scene))["bulk_to_shear"] == pytest.approx(1e4)

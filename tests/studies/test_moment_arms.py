@@ -1,6 +1,7 @@
 """Arms of a run beside published ones, on a made case; of the report's anatomy where its data is."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import small
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.studies import moment_arms
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.moment_arms import BLEMKER, NEMETH, coarse, published
 
 CURVE = "hip_flexion_deg,extension_moment_arm_mm\n0,76.8\n30,66.3\n"
@@ -78,6 +80,15 @@ def test_the_hip_goes_from_rest_back_and_on_by_a_hundredth_of_a_radian_a_frame(f
     assert (angles.max(), angles.min()) == pytest.approx(extremes)
     assert np.abs(np.diff(angles)) == pytest.approx(0.1)
     assert scene.numbers[1] == 10
+
+
+def test_a_denied_run_is_no_evidence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though it went as far as was wanted."""
+    run = SimpleNamespace(numbers=(0, 100), outcome=SimpleNamespace(status="denied", message="a bone was crossed"))
+    monkeypatch.setattr(Bench, "reference", lambda _: run)
+    study = moment_arms.ArmStudy("hip_flexion", 25.0, (0.0, 1.0), "gluteus_medius", "extension", ())
+    with pytest.raises(InputError, match="hip_flexion: got a bone was crossed"):
+        list(moment_arms.of_case(study, tmp_path / "runs"))
 
 
 @pytest.mark.slow
