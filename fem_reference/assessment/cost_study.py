@@ -27,7 +27,8 @@ _WANT = "a study as the verb study writes it"
 class CaseStudy:
     """The points of a case. ``units`` of errors by ``metric.statistic``, and ``bars``, the error bars of the truth, by the same;
     ``truth``: its description; ``claims``: error bars of coarser members with their errors; ``triangles``; ``travel`` [mm], the
-    greatest displacement of the truth; ``features`` of the case, as far as its scene states them (:mod:`studies.features`).
+    greatest displacement of the truth; ``features`` of the case, as far as its scene states them (:mod:`studies.features`);
+    ``truth_key``: the folder of the truth's run in a store, "" where that is not known.
     """
 
     case: str
@@ -40,6 +41,7 @@ class CaseStudy:
     triangles: int
     travel: Amount
     features: dict[str, Amount] = field(default_factory=dict)
+    truth_key: str = ""
 
     @property
     def counted(self) -> tuple[Point, ...]:

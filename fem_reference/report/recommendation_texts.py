@@ -8,6 +8,9 @@ from fem_reference.assessment.fronts import LOADED
 from fem_reference.assessment.recommendation import Expected, Recommendation
 from fem_reference.report.words import duration, listed, number, title_of, under_load
 
+# Entries of a point's choice that are no settings in a sentence.
+_UNSAID = ("solver", "scene", "name", "program")
+
 
 def facts(found: Recommendation, metric: str) -> dict[str, object]:
     """A recommendation as valid JSON."""
@@ -118,6 +121,6 @@ def _reason(one: Expected, unit: str, limit: float) -> list[str]:
 
 
 def _settings(one: Expected) -> str:
-    choice = {name: value for name, value in one.point.choice.items() if name not in ("solver", "scene", "name")}
+    choice = {name: value for name, value in one.point.choice.items() if name not in _UNSAID}
     changed = one.point.choice.get("scene", {})
     return ", ".join(f"{name} = {value}" for name, value in (*changed.items(), *choice.items())) or one.point.label

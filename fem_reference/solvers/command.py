@@ -29,7 +29,7 @@ from fem_reference.io import files, texts
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.scenes.case import COMMAND, Candidate, SolverChoice
+from fem_reference.scenes.case import COMMAND, MACHINE_ONLY, Candidate, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common import open_formats, programs
 from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
@@ -71,23 +71,35 @@ class CommandSettings(Record):
         """A hash over the contents of :func:`sources`, as a part of the key of a run."""
         digest = hashlib.sha256()
         for path in sources(self):
-            digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+            name = path.relative_to(self.place) if path.is_relative_to(self.place) else path.name
+            digest.update(str(name).encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
         return digest.hexdigest()[:16]
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The program, the files that words of the command name, with a Python file all Python files beside it, and ``files``."""
-    directory, words = settings.place, shlex.split(settings.command)
+    """The program, the files that words of the command name, also behind a ``=`` and by values of settings, with a Python file all
+    those beside and below it, and ``files``.
+    """
+    directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
-    named = [directory / word for word in words[1:]] + ([] if program is None else [program])
+    ends = [word.split("=", count)[-1] for word in words[1:] for count in range(word.count("=") + 1)]
+    named = [directory / end for end in ends] + ([] if program is None else [program])
     found = {path for path in named if path.is_file()}
     for name in settings.files:
         path = directory / name
         if not path.exists():
             raise InputError("files", f'"{name}", which is not at {path}', "a file or folder that exists")
         found |= {path} if path.is_file() else {one for one in path.rglob("*") if one.is_file()}
-    found |= {beside for path in found if path.suffix == ".py" for beside in path.parent.glob("*.py")}
+    for folder in {path.parent for path in found if path.suffix == ".py"}:
+        found |= programs.modules(folder)
     return sorted(path for path in found if "__pycache__" not in path.parts)
+
+
+def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
+    """The words of the command with the values of its settings, and of the folders that have ``places``."""
+    values = {key: str(value) for key, value in (*settings, *places.items())}
+    words = shlex.split(settings.command)
+    return [_PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), word) for word in words]
 
 
 class Description(recorded.About):
@@ -158,7 +170,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     for folder in FOLDERS:
         if folder not in names:
             raise InputError(where, f'"{command}"', f"{{{folder}}} in it")
-    taken = {*CommandSettings.model_fields, "solver", "name"}
+    taken = {*CommandSettings.model_fields, *MACHINE_ONLY, "solver", "name", "folder"}  # the last is a file of a scene
     for name in names:
         if name in taken or hasattr(CommandSettings, name):
             raise InputError(where, f'"{{{name}}}"', "another name of a setting: this one has a meaning here")
@@ -217,11 +229,9 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
         for place in places.values():
             place.mkdir()
         open_formats.write(problem, places["scene"], {})
-        values = {key: str(value) for key, value in settings} | {key: str(path) for key, path in places.items()}
-        words = shlex.split(settings.command)
-        filled = [_PLACEHOLDER.sub(lambda found: values[found[1]], word) for word in words]
+        words = _filled(settings, places)
         try:
-            ended = programs.run(filled, settings.place, settings.time_limit)
+            ended = programs.run(words, settings.place, settings.time_limit)
         except OSError as error:
             return Outcome("crashed", f"{words[0]} does not start: {error.strerror}")
         return _read(problem, settings, ended, places["out"], sink)

@@ -60,8 +60,8 @@ def stored(folder: Path) -> list[CaseStudy]:
 
 
 def _with_points(study: CaseStudy, other: CaseStudy) -> CaseStudy:
-    """A study with the points of an ``other`` one that it has not, where both are of the same case and truth."""
-    if (study.features, study.truth, study.triangles) != (other.features, other.truth, other.triangles):
+    """A study of a case with the points of an ``other`` one that it has not, where both are against the same known truth."""
+    if not study.truth_key or study.truth_key != other.truth_key:
         return study
     own = {(point.name, str(point.choice)) for point in study.points}
     more = tuple(point for point in other.points if (point.name, str(point.choice)) not in own)
@@ -102,6 +102,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
         triangles=triangles,
         travel=context.travel,
         features=features(case, bench.setup()),
+        truth_key="" if truth.folder is None else truth.folder.name,
     )
 
 
@@ -123,14 +124,18 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not."""
+    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not, and the hash of
+    a program.
+    """
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)
+        computed = {name: getattr(own, name) for name in type(own).model_computed_fields}
     except InputError:  # the trial failed for it
         return given
     fields = {key: field for key, field in type(own).model_fields.items() if not field.exclude}
-    return {key: value for key, value in given.items() if key in fields and getattr(own, key) != fields[key].default}
+    changed = {key: value for key, value in given.items() if key in fields and getattr(own, key) != fields[key].default}
+    return changed | computed
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:

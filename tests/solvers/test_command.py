@@ -206,6 +206,9 @@ def test_a_program_that_only_waits_says_nothing_of_what_was_solved(bar, tmp_path
         ("mine {scene} {out} {count}", "count: got nothing, want this key"),
         ("mine {scene} {out} {unit}", 'command: got "{unit}", want another name of a setting'),
         ("mine {scene} {out} {copy}", 'command: got "{copy}", want another name of a setting'),
+        ("mine {scene} {out} {precision}", 'command: got "{precision}", want another name of a setting'),  # in no key
+        ("mine {scene} {out} {ranks}", 'command: got "{ranks}", want another name of a setting'),
+        ("mine {scene} {out} {folder}", 'command: got "{folder}", want another name of a setting'),  # of a scene
     ],
 )
 def test_a_command_that_cannot_be_filled_in_is_refused(text, problem) -> None:
@@ -254,6 +257,35 @@ def test_a_changed_program_is_another_one(tmp_path) -> None:
     assert same == seen[4]
     with pytest.raises(InputError, match=r'files: got "gone"'):
         command.require(settings(tmp_path, text, files=["gone"]))
+
+
+@pytest.mark.parametrize("words", ["--config {config}", "--config={config}", "--set=config=in/{stem}.toml"])
+def test_a_changed_file_that_a_setting_or_an_option_names_is_another_program(tmp_path, words) -> None:
+    text = program(tmp_path, words=f"{words} {{scene}} {{out}}")
+    given = {name: value for name, value in (("config", "in/one.toml"), ("stem", "one")) if f"{{{name}}}" in words}
+    (tmp_path / "in").mkdir()
+    seen = set()
+    for content in ("1", "2"):
+        (tmp_path / "in" / "one.toml").write_text(content)
+        seen.add(settings(tmp_path, text, **given).program)
+    assert len(seen) == 2
+
+
+def test_packages_below_a_python_program_belong_to_it(tmp_path) -> None:
+    """Other than caches, hidden folders and virtual environments; a module that moves is another one."""
+    text = program(tmp_path)
+    for place in ("pack/deep", "__pycache__", ".hidden", "env/lib"):
+        (tmp_path / place).mkdir(parents=True)
+    (tmp_path / "env" / "pyvenv.cfg").write_text("")
+    (tmp_path / "pack" / "gone.py").symlink_to(tmp_path / "nowhere.py")
+    first = settings(tmp_path, text).program
+    for place in ("__pycache__", ".hidden", "env", "env/lib"):
+        (tmp_path / place / "module.py").write_text("")
+        assert settings(tmp_path, text).program == first, place
+    (tmp_path / "pack" / "deep" / "module.py").write_text("")
+    deep = settings(tmp_path, text).program
+    (tmp_path / "pack" / "deep" / "module.py").rename(tmp_path / "pack" / "module.py")
+    assert len({first, deep, settings(tmp_path, text).program}) == 3
 
 
 def test_candidate_toml_describes_the_command(tmp_path) -> None:

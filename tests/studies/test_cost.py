@@ -88,17 +88,33 @@ def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> 
         cost.stored(tmp_path)
 
 
-def test_studies_of_one_case_against_the_same_truth_are_one(tmp_path: Path) -> None:
-    """The study of the case's own name counts where both have a point; one of a case that was changed since adds nothing."""
+def test_a_command_with_an_edited_program_is_another_setting(tmp_path: Path) -> None:
+    scene, seen = casefile.read_muscle(small.write(tmp_path / "bar")), []
+    choice = SolverChoice(solver="command", command="python mine.py {scene} {out}", directory=str(tmp_path))
+    for text in ("1", "2"):
+        (tmp_path / "mine.py").write_text(text)
+        seen.append(cost.settings_of(Trial(scene, choice, "mine")))
+    assert seen[0]["command"] == seen[1]["command"]
+    assert seen[0] != seen[1]
 
-    def store(name: str, motion: float, *points) -> None:
+
+def test_studies_of_one_case_against_the_same_truth_are_one(tmp_path: Path) -> None:
+    """The study of the case's own name counts where both have a point; one against another truth or an unknown one adds nothing."""
+
+    def store(name: str, key: str | None, *points) -> None:
         of = CaseStudy("hip", "Hip", "its reference", points, {studied.ERROR: "mm"}, {}, (), 100, 1.0)
         path = tmp_path / name / "study.json"
-        path.parent.mkdir()
-        path.write_text(json.dumps(facts(replace(of, features=dict.fromkeys(FEATURES, 1.0) | {"motion": motion}), {})))
+        path.parent.mkdir(parents=True)
+        table = facts(replace(of, features=dict.fromkeys(FEATURES, 1.0)), {}) | {"truth_key": key}
+        path.write_text(json.dumps({name: value for name, value in table.items() if value is not None}))
 
-    store("hip", 2.0, studied.point(3.0, 1.0))
-    store("hip-a", 2.0, studied.point(3.5, 1.0), studied.point(1.0, 2.0, "relax"))
-    store("hip-b", 4.0, studied.point(0.1, 2.0, "changed"))
+    store("hip", "fenicsx-1", studied.point(3.0, 1.0))
+    store("hip-a", "fenicsx-1", studied.point(3.5, 1.0), studied.point(1.0, 2.0, "relax"))
+    store("hip-b", "fenicsx-2", studied.point(0.1, 2.0, "changed"))
+    store("hip-c", None, studied.point(0.2, 2.0, "old"))
     (found,) = cost.stored(tmp_path)
     assert [(point.solver, point.errors[studied.ERROR]) for point in found.points] == [("pbd", 3.0), ("relax", 1.0)]
+    for name in ("hip", "hip-a"):  # of before there were keys: nobody knows their truths to be one
+        store(f"old/{name}", None, studied.point(3.0, 1.0, name))
+    (found,) = cost.stored(tmp_path / "old")
+    assert [point.solver for point in found.points] == ["hip"]

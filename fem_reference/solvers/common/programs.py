@@ -47,6 +47,16 @@ def found(word: str, directory: Path) -> Path | None:
     return None if path is None else Path(path)
 
 
+def modules(folder: Path) -> set[Path]:
+    """The Python files in a ``folder`` and below it, but for caches, hidden folders and virtual environments."""
+    found = set[Path]()
+    for place, folders, names in folder.walk():
+        inner = [name for name in folders if name != "__pycache__" and not name.startswith(".")]
+        folders[:] = [name for name in inner if not (place / name / "pyvenv.cfg").exists()]
+        found |= {path for name in names if (path := place / name).suffix == ".py" and path.is_file()}
+    return found
+
+
 def run(words: list[str], directory: Path, time_limit: float) -> Ended:
     """Run a program in a ``directory`` to its end, without a shell and without input; none of its processes outlives the call.
 
