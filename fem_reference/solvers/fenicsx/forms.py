@@ -45,7 +45,8 @@ class Derivatives(NamedTuple):
 
 class Form:
     """The weak form of a body. ``derivatives``: those of the energy, with ``kinds`` variables per component of the displacement;
-    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 without.
+    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 without;
+    ``stretched``: that of what stores energy on the surface, 0 without.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
     fibres). To be set: the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
@@ -90,7 +91,8 @@ class Form:
         }
         self._isotropic = None if self.rest is None else self._derivatives(self.rest.isotropic(state), variables)
         self.set_amounts(body.frames[0])
-        self.loads = self._loads(acting, state, unknowns) + (ufl.derivative(stretched, unknowns) if stretched else 0)
+        self.loads = self._loads(acting, state, unknowns)
+        self.stretched: Any = ufl.derivative(stretched, unknowns) if stretched else 0
 
     def set_amounts(self, frame: float) -> None:
         """Set the amounts of effects at a frame, and the derivatives of effects that are not zero over whole frames there."""

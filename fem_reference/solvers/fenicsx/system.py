@@ -44,9 +44,11 @@ class System:
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
         self.ties = [one for one in conditions if isinstance(one, PointSprings)]
         springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
-        self.loads, self.springs = (
-            [SurfaceSums(terms, unknowns, self.fixed)] if terms else [] for terms in (form.loads, springs)
+        self.stretched, self.loads, self.springs = (
+            [SurfaceSums(terms, unknowns, self.fixed)] if terms else []
+            for terms in (form.stretched, form.loads, springs)
         )
+        self.surface = self.springs + self.loads + self.stretched
         self.contact: ContactForces | None = None
         self.touching: TouchingForces | None = None
         self.matrix, whole = PETSc.Mat().create(space.mesh.comm), self.index_map.size_global * self.block
@@ -65,7 +67,7 @@ class System:
         diagonal = np.flatnonzero(structure.columns == rows)
         own = np.flatnonzero(self.fixed[: self.owned])
         self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
-        for terms in self.springs + self.loads:
+        for terms in self.surface:
             terms.find_places(self._keys())
 
     def _keys(self) -> Ints:
@@ -104,7 +106,7 @@ class System:
         with self.spent.on("assembly"):
             self.work.array[:], self.tangent.entries[:] = 0, 0
             self.cells.add(self.work.array, self.tangent, moves, pointwise=pointwise)
-            for terms in self.springs + self.loads:
+            for terms in self.surface:
                 terms.add_tangent(self.tangent.entries)
             ties = [tie.tangent() for tie in self.ties]
             for points in [*ties, *(self.contact.tangent() if self.contact else ())]:
@@ -117,7 +119,7 @@ class System:
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
         """Add all terms besides cells, and the parts of other ranks; the norm of the residual."""
-        for terms in self.springs + self.loads:
+        for terms in self.surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
             tie.add_residual(self.work.array, moves)
@@ -169,7 +171,7 @@ class System:
         """
         self.work.array[:] = 0
         self.cells.add(self.work.array)
-        for load in [] if inside else self.loads:
+        for load in self.stretched + ([] if inside else self.loads):
             load.add_residual(self.work.array, None)
         if self.contact and not inside:
             self.contact.add_residual(self.work.array, None)

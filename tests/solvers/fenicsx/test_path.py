@@ -86,10 +86,15 @@ def test_drag_feels_a_way_there_and_back_within_a_load_step(session) -> None:
     assert np.abs(solved.last.points - body.mesh.points).max() > 1e-3
 
 
-@pytest.mark.parametrize("element", ["P2/P1", "P1/P1"])
-def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) -> None:
+SHEET = effects.make(
+    "membrane", on="x1", thickness=0.1, mu=0.1
+)  # stores as much as the bar, whose mu is 0.01 MPa, or more
+
+
+@pytest.mark.parametrize(("element", "sheets"), [("P2/P1", ()), ("P1/P1", ()), ("P2/P1", (SHEET,))])
+def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, sheets, session) -> None:
     """By the trapezoidal rule, whose error of a step falls with its cube and the energy with its square; where pressures are
-    stabilised too, whose energy is a part of it.
+    stabilised too, whose energy is a part of it, and of a membrane, whose force is from inside as well.
     """
     mesh = shapes.box((2, 2, 4), (1.0, 1.0, 3.0), "tetrahedron")
     turn = Follows(RigidMotion((0, 1, 0), (0.5, 0.5, 1.5), (0.0, 1.0), (0.0, 0.6)).pose)
@@ -97,9 +102,11 @@ def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) ->
     gaps = []
     for steps in (4, 8):
         frames = tuple(np.linspace(0.0, 1.0, steps + 1).tolist())
-        solved = session.solve(Body(mesh, flesh(element), fixed, frames), BodySettings(element=element, first_step=1.0))
+        body = Body(mesh, (*flesh(element), *sheets), fixed, frames)
+        solved = session.solve(body, BodySettings(element=element, first_step=1.0))
         gaps.append(abs(solved.last.scalars["energy_gap"]))
     assert gaps[0] / gaps[1] > 4
+    assert gaps[1] < 2e-3
 
 
 class Springs:
