@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
+from fem_reference.problems.overlaps import overlap
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
@@ -31,9 +32,12 @@ class TouchingForces:
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.look()
-        for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if (depth := -float(met.gap.min(initial=0.0))) > one.law.smoothing:
-                raise ArithmeticError(f'"{one.law.one}" and "{one.law.other}" overlap by {depth:.3g} mm')
+        depths = [
+            (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
+        ]
+        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching)]:
+            if depth > law.smoothing:
+                raise ArithmeticError(f'"{law.one}" and "{law.other}" overlap by {depth:.3g} mm')
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""

@@ -121,6 +121,15 @@ def test_overlap_at_rest_is_refused(fem_lab) -> None:
     assert 'at rest: "low_z1" and "high_z0" overlap by 0.1 mm' in outcome.message
 
 
+@pytest.mark.parametrize(("deep", "status"), [(0.0, "converged"), (0.15, "diverged")])
+def test_overlap_at_rest_is_refused_where_it_is_deeper_than_facets_are_wide(deep, status, fem_lab) -> None:
+    # Facets of 0.1 mm: no point meets one that is 0.15 mm above it.
+    low, high = (block((4, 4, 1), (0.4, 0.4, 0.4)) for _ in range(2))
+    outcome = solved(fem_lab, pair(low, placed(high, 0.0, 0.0, 0.4 - deep), 0.0, 0.0, 0.01)).outcome
+    assert outcome.status == status
+    assert ('at rest: "low_z1" and "high_z0" overlap by 0.15 mm' in outcome.message) == bool(deep)
+
+
 def test_what_is_not_supported_is_refused() -> None:
     body = pair(block((1, 1, 1)), placed(block((1, 1, 1)), 0.0, 0.0, 0.5), 0.0, 0.0, -0.1)
     with pytest.raises(InputError, match="touching: got parts that touch, want a body without"):

@@ -1,0 +1,62 @@
+"""Overlap of parts of the surface of a body that may touch, at the start: the search for contact sees only what is shallow."""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
+from fem_reference.geometry.distance import distances, inside
+from fem_reference.geometry.intersections import crossings, overlaps
+from fem_reference.problems.body import Body, Cells, facet_corners, reference_nodes
+from fem_reference.problems.touching import Touching
+
+_SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # a facet with four corners in two triangles
+
+
+def overlap(body: Body, law: Touching) -> float:
+    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least: the greatest of a corner of either below the
+    skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what they bulge.
+    """
+    mesh, points = body.mesh, body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
+    one, other = mesh.facets[law.one], mesh.facets[law.other]
+    owner, facets, triangles = _skin(mesh, points)
+    piece = connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(points))
+    depths, keys, parts = [0.0], np.sort(facets, axis=1).tolist(), list[Surface]()
+    for part, against in ((one, other), (other, one)):
+        skin = Surface(points, triangles[np.isin(piece[facets[:, 0]], piece[against])[owner]])
+        corners = points[np.unique(part)]
+        depths.append(distances(corners[inside(skin, corners)], skin).distance.max(initial=0.0))
+        own = set(map(tuple, np.sort(part, axis=1).tolist()))
+        parts.append(Surface(points, triangles[np.array([tuple(key) in own for key in keys])[owner]]))
+    if len(pairs := crossings(*parts)):
+        crossed = (points[part.triangles[some]] for part, some in zip(parts, pairs.T, strict=True))
+        depths.append(overlaps(*crossed).max())
+    return float(max(depths)) - _bulge(mesh, points, np.concatenate([one, other]))
+
+
+def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
+    """The facets (f, 3 or 4) of one cell each, and triangles (t, 3) of these that face outwards, with the facet (t,) of each."""
+    sides = np.array(facet_corners(mesh.kind))
+    every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
+    _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
+    outer = first[counts == 1]
+    split = _SPLIT[: sides.shape[1] - 2]
+    triangles, owner = every[outer][:, split].reshape(-1, 3), np.repeat(np.arange(len(outer)), len(split))
+    middles = points[mesh.cells].mean(axis=1)[outer // len(sides)][owner]
+    corners = points[triangles]
+    inwards = np.vecdot(normals(corners), corners.mean(axis=1) - middles) < 0
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    return owner, every[outer], triangles
+
+
+def _bulge(mesh: Cells, points: Floats, parts: Ints) -> float:
+    """The greatest distance [mm] of a node from its place in a straight cell with the same corners, and of a facet with four from
+    its triangles, of the cells beside the facets ``parts``.
+    """
+    nodes, corners = reference_nodes(mesh.kind, mesh.degree), reference_nodes(mesh.kind, 1)
+    at = points[mesh.cells[np.isin(mesh.cells[:, : len(corners)], parts).sum(axis=1) >= parts.shape[1]]]
+    if mesh.kind == "tetrahedron":
+        shares, warp = np.hstack([1 - nodes.sum(axis=1, keepdims=True), nodes @ corners[1:].T]), 0.0
+    else:
+        shares = np.where(corners[None] > 0, nodes[:, None], 1 - nodes[:, None]).prod(axis=2)
+        quads = at[:, np.array(facet_corners(mesh.kind))]
+        warp = np.linalg.norm(np.einsum("msci,c->msi", quads, [0.25, -0.25, -0.25, 0.25]), axis=2).max()
+    return float(np.linalg.norm(at - shares @ at[:, : len(corners)], axis=2).max() + warp)
