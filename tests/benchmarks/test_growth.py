@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks import candidates, growth
 
+SLOW = {"rbf_muscle": pytest.mark.nightly}
 POINTS = [{"size": 10.0**k, "iteration": 2e-6 * 100.0**k, "memory": 0.0} for k in range(3)]
 
 
@@ -19,7 +20,7 @@ def test_the_numbers_of_a_fit_are_shown_by_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(growth.GROWING))
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in growth.GROWING])
 def test_candidates_of_the_table_are_measured(name, monkeypatch) -> None:
     """All solve at three sizes; a clock by which an iteration costs the number of its cells gives growth of first order."""
 

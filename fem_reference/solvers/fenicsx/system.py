@@ -166,17 +166,16 @@ class System:
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self, *, inside: bool = False) -> Floats:
-        """The residual (n,) without springs and prescribed values, on the ranks that own the unknowns; or that of the effects
-        ``inside`` alone.
+        """The residual (n,) without springs over facets and prescribed values, on the ranks that own the unknowns; or that of the
+        effects ``inside`` alone.
         """
         self.work.array[:] = 0
         self.cells.add(self.work.array)
         for load in self.stretched + ([] if inside else self.loads):
             load.add_residual(self.work.array, None)
-        if self.contact and not inside:
-            self.contact.add_residual(self.work.array, None)
-        if self.touching and not inside:
-            self.touching.add_residual(self.work.array, None)
+        for force in [] if inside else [*self.ties, self.contact, self.touching]:
+            if force:
+                force.add_residual(self.work.array, None)
         self.work.scatter_reverse(la.InsertMode.add)
         return np.array(self.work.array)
 
