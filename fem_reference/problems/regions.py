@@ -20,9 +20,8 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 _LEAST = 0.5  # the least share of laws of a kind at a point
-_REACHED = (
-    0.25  # the least that the greatest share in a region is: where its width is greater than its depth, it is not there
-)
+# The greatest share in a region is at least this: where its width is greater than its depth, the region is hardly there.
+_REACHED = 0.25
 _ROUNDED = 1e-6  # the error of a sum of shares that is one
 _SURE = 0.99  # below that the greatest share in a region is worth a word
 _SEEN = 1e-3  # an overlap, as a share of the volume, that is worth a word
