@@ -36,14 +36,16 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
 
-def known_plate() -> float:
-    """The block's own force where the plate, a spring beyond its smoothing, has the same."""
-    force = partial(find("loads").squeeze_force, MU, PLATE_BULK, area=1.0)
+def in_series(bulk: float, stiffness: float, travel: float) -> float:
+    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] where a spring on it of a ``stiffness`` [MPa/mm], whose end is
+    moved down by a ``travel`` [mm], has the same: contact is that spring beyond its smoothing.
+    """
+    force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
 
     def apart(stretch: float) -> float:
-        return float(force(stretch=stretch)) + PLATE_STIFFNESS * (stretch - (1 - PLATE_TRAVEL))
+        return float(force(stretch=stretch)) + stiffness * (stretch - (1 - travel))
 
-    return float(force(stretch=brentq(apart, 1 - PLATE_TRAVEL, 1.0, xtol=1e-15)))
+    return float(force(stretch=brentq(apart, 1 - travel, 1.0, xtol=1e-15)))
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
@@ -55,11 +57,19 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-# The force of the whole ball [N]; the radius [mm] from the lever of the force on the quarter, as Hertz's pressures have their
-# middle at 3/8 of it; the greatest pressure [MPa].
+def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
+    """Readings of the force ``name`` on a quarter: that of the whole ball [N], and the radius [mm] of the contact from its lever,
+    as Hertz's pressures have their middle at 3/8 of it.
+    """
+    return {
+        "force": lambda state: 4 * float(state.forces[name][2]),
+        "contact_radius": lambda state: 8 / 3 * float(-state.moments[name][1] / state.forces[name][2]),
+    }
+
+
+# Beside these the greatest pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
-    "force": lambda state: 4 * float(state.forces["ball"][2]),
-    "contact_radius": lambda state: 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2]),
+    **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
 }
 
@@ -71,11 +81,13 @@ def ball(lab: Lab, reading: str, radius: float) -> Finding:
     return Finding(READINGS[reading](state), note=f"the ball is {depth:.1f} micrometres deep in the body")
 
 
+YOUNG, POISSON = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
+
+
 def known_ball(name: str) -> float:
     """The closed form for a rigid ball on a body of the same moduli."""
-    young, poisson = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
     hertz = find("hertz")
-    known = hertz.rigid_sphere(RADIUS, young, poisson, hertz.force_at(RADIUS, young, poisson, APPROACH))
+    known = hertz.rigid_sphere(RADIUS, YOUNG, POISSON, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH))
     return float(getattr(known, name))
 
 
@@ -89,7 +101,7 @@ ENTRIES = (
             measure=plate,
             given={"element": element, "stiffness": PLATE_STIFFNESS},
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
-            truth=known_plate,
+            truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
             relative=True,
             because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",

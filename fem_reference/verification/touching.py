@@ -1,12 +1,10 @@
 """Contact of deformable bodies: two blocks with unrelated meshes, and a ball on a large body, both elastic (Hertz)."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
@@ -14,7 +12,18 @@ from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.paths import Affine
 from fem_reference.problems.touching import Touching
 from fem_reference.runs.store import Frame
-from fem_reference.verification.contact import APPROACH, BULK, CORE, FAR, MU, RADIUS
+from fem_reference.verification.contact import (
+    APPROACH,
+    BULK,
+    CORE,
+    FAR,
+    MU,
+    POISSON,
+    RADIUS,
+    YOUNG,
+    ball_readings,
+    in_series,
+)
 from fem_reference.verification.parts import NO_GRADIENT, SLOW, clamped, control, find, neo_hooke
 
 SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], and [MPa/mm]
@@ -45,16 +54,6 @@ def blocks(lab: Lab, stiffness: float) -> Finding:
     return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} of the mean one")
 
 
-def known_blocks() -> float:
-    """The force of a block of both, in series with the spring of the contact."""
-    force = partial(find("loads").squeeze_force, MU, SOFT, area=1.0)
-
-    def apart(stretch: float) -> float:
-        return float(force(stretch=stretch)) + BLOCK_STIFFNESS * (stretch - (1 - TRAVEL))
-
-    return float(force(stretch=brentq(apart, 1 - TRAVEL, 1.0, xtol=1e-15)))
-
-
 def _quarter(n: int) -> Cells:
     """A quarter of a large body, z >= 0, of cells that grow from ``n`` in its core; its region "near" is the middle of z0."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
@@ -81,13 +80,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-# As of a rigid ball in ``contact``.
-READINGS: dict[str, Callable[[Frame], float]] = {
-    "force": lambda state: 4 * float(state.forces["low_near on high_near"][2]),
-    "contact_radius": lambda state: (
-        8 / 3 * float(-state.moments["low_near on high_near"][1] / state.forces["low_near on high_near"][2])
-    ),
-}
+READINGS = ball_readings("low_near on high_near")
 
 
 def ball(lab: Lab, reading: str, radius: float) -> Finding:
@@ -100,11 +93,10 @@ def ball(lab: Lab, reading: str, radius: float) -> Finding:
 
 def known_ball(name: str) -> float:
     """The closed form for an elastic ball on a body of the same material."""
-    young, poisson = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
     hertz = find("hertz")
-    flat, round_ = (hertz.Side(radius, young, poisson) for radius in (math.inf, RADIUS))
+    flat, round_ = (hertz.Side(radius, YOUNG, POISSON) for radius in (math.inf, RADIUS))
     # Two compliances of the same size: half the force of a rigid ball at the same approach.
-    return float(getattr(hertz.Hertz(flat, round_, hertz.force_at(RADIUS, young, poisson, APPROACH) / 2), name))
+    return float(getattr(hertz.Hertz(flat, round_, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH) / 2), name))
 
 
 ENTRIES = (
@@ -116,7 +108,7 @@ ENTRIES = (
         measure=blocks,
         given={"stiffness": BLOCK_STIFFNESS},
         **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
-        truth=known_blocks,
+        truth=partial(in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
         within=2e-4,
         relative=True,
         because="points of either mesh do not integrate the other's functions exactly: 6e-5 remain, and 2 % of the pressure",
