@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.runs.store import Run
@@ -39,6 +40,14 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
         known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
         size = np.maximum(apart, float(np.median(apart[known] / moved[known])) * moved) if known.any() else size
     return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * size)
+
+
+def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
+    """The bar (f,) of independent causes from the ``parts`` (f,) of it by cause, and the greatest of each part over the frames
+    ``there`` (f,), over all where there are none.
+    """
+    greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
+    return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest
 
 
 def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import BeforeValidator, PlainValidator, TypeAdapter
 
-from fem_reference.assessment.differences import carried, typical, typical_changes
+from fem_reference.assessment.differences import carried, together, typical, typical_changes
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import files, texts
@@ -156,11 +156,9 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
             if one.metric == "volume" and one.statistic in outside:
                 parts[CARRIED] = SAFETY * outside[one.statistic]
-            there = np.isfinite(one.values)  # an arm has none without a force
-            greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
             model = _model(one, None if exact is None else exact[of][i], own[i].values if pair.springs else None)
-            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
-            bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
+            there = np.isfinite(one.values)  # an arm has none without a force
+            bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, *together(parts, there), model))
     return ErrorBars(pair.fine.numbers, pair.sizes, ORDER, tuple(bars))
 
 

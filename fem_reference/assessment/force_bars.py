@@ -6,7 +6,7 @@ short bar where it crosses zero. Two bones between which a muscle is in balance 
 
 import numpy as np
 
-from fem_reference.assessment.differences import typical
+from fem_reference.assessment.differences import together, typical
 from fem_reference.assessment.error_bars import SPREAD, TETRAHEDRA, VARIATION, ErrorBar, Pair
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import MeasurementContext, as_surface, at_rest, measure
@@ -29,9 +29,8 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
             for name, runs in others.items():
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
-            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # the causes are independent
-            greatest = {name: float(part.max()) for name, part in parts.items()}
-            bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, total, greatest, _model(pair, kind, bone)))
+            bar = together(parts, np.ones(len(moved), bool))
+            bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, _model(pair, kind, bone)))
     return tuple(bars)
 
 

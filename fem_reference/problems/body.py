@@ -53,10 +53,18 @@ def is_stabilised(element: str) -> bool:
 
 def boundary_facets(mesh: "Cells") -> Ints:
     """The facets that belong to only one cell, as their corners (f, 3 or 4) in ascending order."""
-    sides = facet_corners(mesh.kind)
-    facets = np.sort(mesh.cells[:, np.array(sides)].reshape(-1, len(sides[0])), axis=1)
-    unique, counts = np.unique(facets, axis=0, return_counts=True)
-    return np.asarray(unique[counts == 1])
+    return np.sort(outer_facets(mesh)[0], axis=1)
+
+
+def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
+    """The facets that belong to only one cell, as their corners (f, 3 or 4) in the order of ``facet_corners``, and that cell (f,).
+    They are in the order of their ascending corners.
+    """
+    sides = np.array(facet_corners(mesh.kind))
+    every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
+    _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
+    outer = first[counts == 1]
+    return every[outer], outer // len(sides)
 
 
 def facet_corners(kind: Kind) -> list[tuple[int, ...]]:

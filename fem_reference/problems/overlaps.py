@@ -5,7 +5,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings, overlaps
-from fem_reference.problems.body import Body, Cells, facet_corners, reference_nodes
+from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
 _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # a facet with four corners in two triangles
@@ -34,17 +34,14 @@ def overlap(body: Body, law: Touching) -> float:
 
 def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
     """The facets (f, 3 or 4) of one cell each, and triangles (t, 3) of these that face outwards, with the facet (t,) of each."""
-    sides = np.array(facet_corners(mesh.kind))
-    every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
-    _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
-    outer = first[counts == 1]
-    split = _SPLIT[: sides.shape[1] - 2]
-    triangles, owner = every[outer][:, split].reshape(-1, 3), np.repeat(np.arange(len(outer)), len(split))
-    middles = points[mesh.cells].mean(axis=1)[outer // len(sides)][owner]
+    facets, cells = outer_facets(mesh)
+    split = _SPLIT[: facets.shape[1] - 2]
+    triangles, owner = facets[:, split].reshape(-1, 3), np.repeat(np.arange(len(facets)), len(split))
+    middles = points[mesh.cells[cells]].mean(axis=1)[owner]
     corners = points[triangles]
     inwards = np.vecdot(normals(corners), corners.mean(axis=1) - middles) < 0
     triangles[inwards] = triangles[inwards][:, ::-1]
-    return owner, every[outer], triangles
+    return owner, facets, triangles
 
 
 def _bulge(mesh: Cells, points: Floats, parts: Ints) -> float:
