@@ -1,4 +1,4 @@
-"""Bars of forces on bones: closed form, the length of vectors, what nobody knows, and a finer solution."""
+"""Bars of forces on bones: closed form, the length of vectors, values that are unknown, and a finer solution."""
 
 from dataclasses import replace
 from pathlib import Path
