@@ -57,9 +57,9 @@ def misplaced(fault: Fault) -> list[str]:
     return [*places, *(f"{fault.name}: no file tests/{name}.py" for name in names)]
 
 
-def fingerprint(fault: Fault) -> str:
-    """A hash of a fault and of the texts of its file and tests, 16 hex digits."""
-    files = [place(ROOT, fault), *(ROOT / "tests" / f"{name}.py" for name in fault.tests.split())]
+def fingerprint(root: Path, fault: Fault) -> str:
+    """A hash of a fault and of the texts of its file and tests below ``root``, 16 hex digits."""
+    files = [place(root, fault), *(root / "tests" / f"{name}.py" for name in fault.tests.split())]
     return hashlib.sha256(b"".join([repr(fault).encode(), *(one.read_bytes() for one in files)])).hexdigest()[:16]
 
 
@@ -127,14 +127,14 @@ def main() -> int:
     if lost or given.places:
         return 1 if lost else 0
     if given.stale:
-        chosen = [one for one in chosen if recorded().get(key(one), {}).get("text") != fingerprint(one)]
+        chosen = [one for one in chosen if recorded().get(key(one), {}).get("text") != fingerprint(ROOT, one)]
     missed = 0
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         copy = Path(folder) / "copy"
         ignored = shutil.ignore_patterns(".git", ".venv", "__pycache__", "reports")
         shutil.copytree(ROOT, copy, ignore=ignored)
         for fault in chosen:
-            begin, text = time.perf_counter(), fingerprint(fault)
+            begin, text = time.perf_counter(), fingerprint(copy, fault)
             red, said = plant(fault, copy)
             record(fault, text, red=red)
             missed += not red
