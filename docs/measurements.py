@@ -40,9 +40,13 @@ def kept(name: str) -> dict[str, Any]:
 def table(name: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A table in Markdown, and below it where its numbers come from."""
     lines = [list(head), ["---"] * len(list(head)), *([str(cell) for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin(name)}</small>\n"
+
+
+def origin(name: str) -> str:
+    """The command of a kept measurement, and when and where it was made."""
     file = kept(name)
-    origin = f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin}</small>\n"
+    return f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
 
 
 def number(value: float | None, digits: int = 3) -> str:

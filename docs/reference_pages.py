@@ -85,6 +85,12 @@ def laws() -> str:
     return _sections(effect_records())
 
 
+def parameters() -> str:
+    """The parameters of every effect, in one table; the region of an effect is said beside it."""
+    rows = [f"| `{name}` | {'; '.join(map(_parameter, keys.items()))} |\n" for name, keys in _parameters().items()]
+    return "| effect | parameters |\n|---|---|\n" + "".join(rows)
+
+
 def ranges() -> str:
     """The ranges of parameters of effects in the literature."""
     rows = [
@@ -128,6 +134,20 @@ GENERATED: dict[str, Callable[[], str]] = {
     "gallery": gallery,
     "examples": examples,
 }
+
+
+def _parameters() -> dict[str, dict[str, Any]]:
+    found = {name: _fields(records[0]) for name, records in effect_records().items()}
+    return {name: {key: field for key, field in fields.items() if key != "in"} for name, fields in found.items()}
+
+
+def _parameter(named: tuple[str, Any]) -> str:
+    """A key with its value, and its unit alone where it is a quantity."""
+    key, field = named
+    value = _value(field.annotation, field.metadata)
+    for long, short in (("three quantities, kept in", "three, in"), ("quantity, kept in ", ""), (" (", " "), (")", "")):
+        value = value.replace(long, short)
+    return f"`{key}` ({_cell(value)}{'' if field.is_required() else ', optional'})"
 
 
 def _script(name: str) -> str:
