@@ -5,6 +5,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,11 @@ from matplotlib.figure import Figure
 from measurements import kept, origin
 
 from fem_reference import report
+from fem_reference.assessment.cost_study import CaseStudy
+from fem_reference.foundations.records import parse
+from fem_reference.report import claims_page, study_page
 from fem_reference.report.drawings import BAND, Drawing, drawn, looks, plain_numbers
+from fem_reference.report.recommendation_texts import answer_texts
 
 _SURFACE = "surface_deviation.rms"
 _VERDICTS = {"ok": "#14713a", "degraded": "#b98a2e", "failed": "#b3261e", "": "#bbbbbb"}
@@ -34,8 +39,23 @@ def dark_colours() -> dict[str, str]:
 def _placed(name: str) -> str:
     measurement, draw = DRAWN[name]
     found = draw(kept(measurement)["measured"])
-    said = re.sub("`(.*?)`", r"<code>\1</code>", f"{found.title}. {origin(measurement)}")
+    said = re.sub("`(.*?)`", r"<code>\1</code>", f"{found.title.rstrip('.')}. {origin(measurement)}")
     return f'```{{raw}} html\n<div class="drawn">{found.markup}<p>{said}</p></div>\n```\n'
+
+
+def cost_front(measured: dict[str, Any]) -> Drawing:
+    """Error against time of every setting of every solver, and the fronts, with what the verb recommend says."""
+    case = parse(CaseStudy, measured, "fronts")
+    said = answer_texts(study_page.answered(case), case.units[_SURFACE])
+    answers = (f"{i}: {text[0].lower()}{text[1:]}" for i, text in enumerate(said, 1))
+    title = ". ".join(("Fronts; what to take", *answers, study_page.load_of(case.points).capitalize()))
+    return replace(study_page.front(case, _SURFACE), title=title)
+
+
+def bars_and_errors(measured: dict[str, Any]) -> Drawing:
+    """Error bars of coarser meshes against their true errors."""
+    claims = parse(CaseStudy, measured, "fronts").claims
+    return claims_page.drawing(claims, "surface_deviation", "claims")
 
 
 def solvers_on_muscles(measured: list[dict[str, Any]]) -> Drawing:
@@ -111,6 +131,8 @@ def _count(row: dict[str, Any], verdict: str) -> int:
 
 
 DRAWN: dict[str, tuple[str, Callable[[Any], Drawing]]] = {
+    "cost_front": ("fronts", cost_front),
+    "bars_and_errors": ("fronts", bars_and_errors),
     "solvers_on_muscles": ("table_5_1", solvers_on_muscles),
     "omissions": ("effects", omissions),
     "hard_cases": ("stress", hard_cases),
