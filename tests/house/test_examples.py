@@ -9,7 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import example_pictures
 import pytest
 
 from fem_reference.foundations.subprocesses import environment
@@ -94,14 +93,6 @@ def test_a_notebook_ends_in_its_number(folder: Path, name: str) -> None:
         shutil.copy(EXAMPLES / file, folder)
     printed = output(folder, str(Path(__file__).parents[1] / "run_notebook.py"), f"{name}.ipynb")
     assert float(printed.split()[-1]) == NOTEBOOKS[name][0]
-
-
-def test_every_picture_is_that_of_its_example() -> None:
-    """Python docs/example_pictures.py makes them anew."""
-    assert json.loads(example_pictures.FILE.read_text(encoding="utf-8")) == example_pictures.sources()
-    drawn = {path.name: path.stat().st_size for path in example_pictures.KEPT.glob("*.webp")}
-    assert set(drawn) == {example_pictures.picture(name).name for name in example_pictures.sources()}
-    assert max(drawn.values()) < 30_000
 
 
 @pytest.mark.slow
