@@ -63,11 +63,11 @@ def test_the_error_bar_beside_a_row_is_that_of_its_statistic_in_its_frame(path, 
     texts = [one.text for one in ElementTree.fromstring(regression_texts.junit(found, 1)).iter("failure")]
     named = [dict(line.split(": ", 1) for line in text.splitlines()) for text in texts]
     rows += [list(one.values()) for one in named if one["question"] == "within"]
-    assert {row[3] for row in rows} == {frame}
+    assert frame in {row[3] for row in rows}
     assert len(rows) >= 14  # seven statistics of the surface, in both texts
-    for _, _, name, *_, bar in rows:
+    for _, _, name, at, *_, bar in rows:
         unit, values = own[name]
-        assert bar == f"{values[int(frame)]:.4g} {unit}", name
+        assert bar == f"{values[int(at)]:.4g} {unit}", name
 
 
 def test_notes_are_in_every_text(mixed) -> None:
