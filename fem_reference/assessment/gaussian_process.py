@@ -1,9 +1,9 @@
 """A Gaussian process: a function of a few variables from its values in runs, where no polynomial follows it; and its sensitivities.
 
-A linear trend, and about it a process whose covariance is the exponential of the negative square of the distance, over a length of
-its own in each variable. Lengths and noise are those of the greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for
-Machine Learning, sections 2.7 and 5.4.1), with the trend and one variance of all outputs at their best. Sobol's indices are sampled:
-those of a variable alone as Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), with others as Jansen 1999.
+A linear trend, and about it a process whose covariance is the exponential of minus the square of the distance, over a length of its
+own in each variable. Lengths and noise are those of the greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for
+Machine Learning, sections 2.7 and 5.4.1), with the trend and one variance of all outputs at their best. Sobol's indices are
+sampled: those of a variable alone as Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), with others as Jansen 1999.
 """
 
 from dataclasses import dataclass
