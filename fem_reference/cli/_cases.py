@@ -25,7 +25,9 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The case with ``--set`` and the effects that it needs; by ``--limit`` it expects METRIC.STATISTIC=VALUE of candidates too."""
+    """The case, with what ``--set`` changes of it and the effects that it needs; it expects of every candidate too that statistics
+    deviate no more than by ``--limit``, METRIC.STATISTIC=VALUE each.
+    """
     if options.negative_control and options.set:
         raise InputError("--negative-control", "with --set", "one of the two")
     changes = dict(map(casefile.setting, options.set))
@@ -69,7 +71,9 @@ def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
 
 
 def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of this name in the case, else frames in this folder, else the solver as in table-5-1; and the place of it."""
+    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
+    settings of the page table-5-1; and the place that chooses it.
+    """
     names = [candidate.name for candidate in case.candidate]
     if text in names:
         if Path(text).is_dir():

@@ -80,8 +80,8 @@ def overlaps(problem: MuscleProblem) -> dict[str, float]:
 
 
 def search_radius(problem: MuscleProblem, deep: float) -> float:
-    """Depth [mm] in a bone to which FEBio looks for contact: less where being ``deep`` [mm] at rest presses more than the matrix
-    bears.
+    """Depth [mm] inside a bone to which FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that
+    would press at once with more than the matrix bears.
     """
     assert problem.contact is not None  # or there is no contact
     matrix = matrix_constants(problem.effects)

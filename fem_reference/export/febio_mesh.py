@@ -99,8 +99,8 @@ def free_facets(problem: MuscleProblem) -> Ints:
 
 
 class SpringPoints(NamedTuple):
-    """Points ``of`` (n,) an attached skin, the nearest ``points`` (n, 3) [mm] on ``facets`` (n, 3), and triangles ``corners`` (n,
-    3, 3) there.
+    """Points of springs on the tetrahedra: ``of`` (n,) those of the attached skin, the nearest ``points`` (n, 3) [mm] to these on
+    boundary ``facets`` (n, 3), and small triangles with ``corners`` (n, 3, 3) [mm] about them that face these.
     """
 
     of: Ints
@@ -170,7 +170,9 @@ class Mesh:
         return self._curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
-        """Kind, points (n, 3) [mm] and triangles on the attached area, or about the points of springs, that face it."""
+        """Kind, points (n, 3) [mm] and triangles that coincide with the area attached, or with parts of it about the points of
+        springs, and face it, as FEBio's pairs must.
+        """
         if attached.attachment in self.problem.attached_skins:
             corners = spring_points(self.problem, attached).corners.reshape(-1, 3)
             return "tri3", corners, np.arange(len(corners)).reshape(-1, 3)

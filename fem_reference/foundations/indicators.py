@@ -105,7 +105,9 @@ class Estimates:
         return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
-        """Displacement [mm] of the surface, rms, where fibres ``pull`` [MPa] at the matrix: a ``share`` of the length at most."""
+        """Displacement [mm] of the surface, root mean square, where fibres ``pull`` [MPa] against the matrix: a ``share`` of the
+        length where they are far stronger.
+        """
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:

@@ -39,7 +39,9 @@ class Shape(Protocol):
         """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None where unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral (3,) of the velocity [mm4/s] over the rest volume, and its moment (3,) [mm5/s] about 0; None if unknown."""
+        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None
+        where unknown.
+        """
 
 
 def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:

@@ -208,7 +208,9 @@ def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
 
 
 def _check_parts(surface: Surface) -> None:
-    """InputError where triangles at a vertex are more than one fan, or those connected by edges are more than one part."""
+    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan, or where its triangles,
+    connected by edges, are more than one part.
+    """
     one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
     _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)

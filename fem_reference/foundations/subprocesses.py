@@ -86,7 +86,9 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
 
 
 class MachineTime(NamedTuple):
-    """A moment by the clock [s], with the processor time [s] of this process and its descendants, and of all (NaN if unknown)."""
+    """A moment: by the clock [s], the processor time [s] of this process with all that descend from it, and that of all processes
+    of the machine, NaN where the system does not say.
+    """
 
     seconds: float
     ours: float

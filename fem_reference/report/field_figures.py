@@ -120,7 +120,9 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
 
 
 def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
-    """Rival, reference and difference by ``draw``, from values (n,) at vertices, all values (k, n) of a scale, and its colours."""
+    """The rival, the reference and their difference, each drawn by ``draw`` from values (n,) at the vertices, all values (k, n)
+    that share their scale, and the name of its colours.
+    """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
     both = np.stack([values for values in solutions if np.isfinite(values).all()] or solutions)

@@ -43,6 +43,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     facts = _head(comparison.scene, reference, comparison.word) | {
         "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
+        "mesh": plain(reference.origin.get("mesh", {})),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in comparison.runs},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],
@@ -95,7 +96,9 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """Forces [N] and moments about 0 [N mm] on each bone that a solver recorded, as measures: lengths by bone, and components."""
+    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their lengths, by the
+    name of the bone, and their components.
+    """
     found = list[Measure]()
     for kind, unit in {"force_on_": "N", "moment_on_": "N mm"}.items():
         parts = {name.removeprefix(kind): values for name, values in run.scalars.items() if name.startswith(kind)}

@@ -93,7 +93,9 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames with error bar and candidates, all less the case's own answer, beside which it would be too narrow."""
+    """A band over the frames, with the error bar of the reference and the candidates: all less the case's own answer, beside which
+    a band would often be too narrow to see.
+    """
     title = band.title if band.distance else f"{band.title}: difference from that of the case"
     return over_frames(f"band-{band.quantity}", title, band.unit, partial(_draw, found, band))
 

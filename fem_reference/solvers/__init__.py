@@ -65,7 +65,9 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and settings for a solver or candidate ``name``: the case's own, else of table-5-1, else the defaults."""
+    """The name of a run and the settings for a solver, or a candidate, of a ``name``: those of the case's own candidate, else those
+    of the page table-5-1, else the solver's defaults.
+    """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]
     for one in (*own, *table):

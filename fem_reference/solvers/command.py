@@ -77,7 +77,9 @@ class CommandSettings(Record):
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The program, files named by words of the command (also behind a ``=``), all Python files beside and below, and ``files``."""
+    """The program, the files that words of the command name, also behind a ``=`` and by values of settings, with a Python file all
+    those beside and below it, and ``files``.
+    """
     directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
     ends = [word.split("=", count)[-1] for word in words[1:] for count in range(word.count("=") + 1)]
@@ -236,7 +238,9 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, with the wanted frames in ``out``, up to the first that is missing or damaged."""
+    """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
+    missing or damaged.
+    """
     kept, trouble, cost = 0, None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)

@@ -55,7 +55,9 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """InputError at ``place`` for what listings lack: 4.1 has 0 at the first node and slope -1 at the last, 4.5 values only."""
+    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request: of
+    conditions listing 4.1 has 0 at the first node and slope -1 at the last, listing 4.5 values only.
+    """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:
         slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]

@@ -31,7 +31,9 @@ FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """The bands from ``runs`` of the reference, none where the case has no solution; InputError where no parameter has a range."""
+    """The bands of a case from so many ``runs`` of its reference, none where the case itself has no solution; InputError where no
+    parameter has a range.
+    """
     varied = unknowns(case)
     case, parameters = varied.case, varied.parameters()
     points = sampled(len(parameters), runs, seed)

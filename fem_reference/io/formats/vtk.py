@@ -69,7 +69,9 @@ def data_set(path: Path) -> DataSet:
 
 
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells`` (in VTU a grid) with point data ``displacement`` (n, 3) [mm], float64; OSError where that fails."""
+    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm], float64; OSError where that
+    fails.
+    """
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)

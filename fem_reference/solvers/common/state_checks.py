@@ -45,7 +45,9 @@ class SurfaceCheck:
         self.width, self.volume = diagonal(rest.points), enclosed_volume(rest.points, rest.triangles)
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged where a position is no number or the surface far larger than at rest; inverted where it is inside out."""
+        """Diverged where a position is not a number, or the surface is much wider or larger than at rest and than its attached
+        vertices are apart; inverted where it is turned inside out.
+        """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):
             return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")

@@ -117,7 +117,9 @@ class March:
         self.nodes = {entry.name: self.equations.space.nodes_on(str(entry.on)) for entry in body.prescribed}
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the last state, which stays where it fails; inverted where det F is not positive at a point."""
+        """Solve at ``frame`` from the last state, which stays where it fails. A state in which det F is not positive, at a
+        quadrature point or a vertex, is inverted whatever Newton's method says.
+        """
         with np.errstate(all="ignore"):  # what is not finite is a failed step
             attempt, unknowns = self._newton(frame)
             if attempt.converged and (trouble := self._trouble(unknowns, frame)) is not None:

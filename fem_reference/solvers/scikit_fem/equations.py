@@ -86,7 +86,9 @@ class Equations:
         return float((energy * self.inside.weights).sum() - stabilising)
 
     def _projection(self) -> Any:
-        """Minus the energy of ``body.is_stabilised`` (N, N): M - B^T D^-1 B of pressure (M), cell constants (D), over 2 mu."""
+        """The matrix (N, N) of minus the energy of ``body.is_stabilised``: M - B^T D^-1 B, with the masses M of the pressure, D of
+        a constant in each cell and B between these, over twice the shear modulus.
+        """
         inside, entries = self.inside, self.inside.variables(np.zeros(self.space.size)).reshape(-1, VARIABLES)
         _, curvature = self._energy_law(inside, variables(entries.T), self.body.frames[0])
         shear = np.mean([curvature[v, v] for v in range(9) if v % 4], axis=0).reshape(inside.weights.shape).mean(axis=1)

@@ -136,7 +136,10 @@ def _place(problem: FieldProblem, basis: Any, laid: Flat) -> Place:
 
 
 def _slope_weights(basis: Any) -> Floats:
-    """Weights (m, t, q) for slopes of a linear function from quadrature points: gradients of quadratics, so also the Laplacian."""
+    """Weights (m, t, q) that give the derivative of a linear function from its values at the quadrature points of a cell.
+
+    The gradient of a quadratic function is linear, so that they give its Laplacian, which scikit-fem does not have.
+    """
     at_points = np.asarray(basis.global_coordinates()).transpose(1, 0, 2)
     return np.asarray(np.linalg.pinv(at_points - at_points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))
 

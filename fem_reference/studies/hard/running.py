@@ -118,7 +118,9 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise _Late after so many seconds of processor time, StalledError after many times that by the clock, in the main thread."""
+    """Raise _Late after so many seconds of this process's processor time, and StalledError after many times as long by the clock,
+    in the main thread; processes of the reference have a limit of their own.
+    """
 
     def late(*_: object) -> None:
         raise _Late
