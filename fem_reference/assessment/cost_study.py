@@ -50,9 +50,7 @@ class CaseStudy:
 
     @property
     def certain(self) -> tuple[Point, ...]:
-        """The points with upper bounds of their errors, for any truth within its bar, which is added to each; for the truth
-        itself its bar.
-        """
+        """The points with upper bounds of their errors for any truth within its bar, added to each, and for the truth itself."""
         return self._with_errors(operator.add)
 
     def _with_errors(self, of: Callable[[float, float], float]) -> tuple[Point, ...]:

@@ -105,9 +105,7 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean of the fibres' mean arm less the published one, of a range its middle, over the poses where that is known [mm];
-        NaN for none.
-        """
+        """The mean of the fibres' mean arm less the published one (a range's middle) over poses that have one [mm]; else NaN."""
         return float(self._off.mean()) if self._off.size else float("nan")
 
     @property
