@@ -50,7 +50,9 @@ class CaseStudy:
 
     @property
     def certain(self) -> tuple[Point, ...]:
-        """The points with upper bounds of their errors for any truth within its bar, added to each, and for the truth itself."""
+        """The points with upper bounds of their errors, for any truth within its bar, which is added to each; for the truth
+        itself its bar.
+        """
         return self._with_errors(operator.add)
 
     def _with_errors(self, of: Callable[[float, float], float]) -> tuple[Point, ...]:

@@ -200,7 +200,9 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence: ``rows``, moment ``arms``, why cases are ``missing``, by name, and ``fits`` of laws to the cubes."""
+    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why some are ``missing``, and ``fits`` of laws
+    to the cubes.
+    """
 
     rows: tuple[Row, ...]
     arms: tuple[ArmsBeside, ...]

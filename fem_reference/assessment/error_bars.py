@@ -175,7 +175,9 @@ def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | N
 def _sizes(
     differences: _Differences, statistics: tuple[Measure, ...], fibres: int, moved: Floats | None = None
 ) -> _Differences:
-    """Sizes of signed ``differences`` of ``statistics`` between runs with so many ``fibres``; surfaces ``moved`` (f,) [mm]."""
+    """The sizes of the signed ``differences`` of ``statistics`` between two runs with so many ``fibres``, whose surfaces have
+    ``moved`` (f,) [mm].
+    """
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]

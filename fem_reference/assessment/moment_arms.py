@@ -105,7 +105,9 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean of the fibres' mean arm less the published one (a range's middle) over poses that have one [mm]; else NaN."""
+        """The mean of the fibres' mean arm less the published one, of a range its middle, over the poses where that is known [mm];
+        NaN for none.
+        """
         return float(self._off.mean()) if self._off.size else float("nan")
 
     @property

@@ -48,7 +48,9 @@ def with_collagen(fibres: float, k1: float, k2: float) -> Material:
 
 @lru_cache(1000)
 def cube(material: Material, stretch: float, degrees: float, *, confined: bool = False) -> CubeState:
-    """A cube with a ``stretch`` along x, fibres at ``degrees`` to it in the plane of x and y; ``confined``: z cannot move."""
+    """A cube loaded along x to a ``stretch``, its fibres at ``degrees`` to that in the plane of x and y; where ``confined``, z
+    cannot move.
+    """
     fibre = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
     return loaded(material, (stretch, FREE, 1.0 if confined else FREE), fibre)
 

@@ -107,7 +107,9 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate beside a band: ``values`` (f,), and by frame ``places``, empty where there is no band or no value is expected."""
+    """A candidate beside a band: its ``values`` (f,), and by frame its ``places``, empty where there is no band or no value is
+    expected.
+    """
 
     candidate: str
     quantity: str

@@ -38,7 +38,9 @@ def among(acting: Iterable[object]) -> InSitu | None:
 
 
 def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
-    """The shear and bulk modulus [MPa] at rest of ``effects``; where these have no bulk modulus, ten times the shear modulus."""
+    """The shear and bulk modulus [MPa] of the isotropic body: those at rest of ``effects``; where these have no bulk modulus, ten
+    times the shear modulus.
+    """
     found = moduli(effects)
     return found.shear, found.bulk or 10 * found.shear
 

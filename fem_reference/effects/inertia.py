@@ -52,7 +52,9 @@ class Inertia(Energy):
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement [mm] after ``seconds`` without forces, from ``u``, velocity ``v``, acceleration ``a`` of one shape."""
+        """The displacement [mm] after a step of ``seconds`` without forces, from ``u`` with velocity ``v`` and acceleration ``a``
+        (arrays of one shape).
+        """
         alpha, _, beta = self._rule()
         return u + seconds * v + seconds**2 * (0.5 - beta - beta * alpha / (1 - alpha)) * a
 

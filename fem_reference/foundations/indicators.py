@@ -83,7 +83,9 @@ class Estimates:
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
-        """Shift [mm], rms, of a bar with clamped ends along itself by a ``force`` per volume [N/mm3]: 2/3 of its middle's."""
+        """Shift [mm], root mean square, of a bar with clamped ends along itself by a ``force`` per volume [N/mm3]: two thirds of
+        that of its middle.
+        """
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
@@ -103,7 +105,9 @@ class Estimates:
         return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
-        """Displacement [mm] of the surface, rms, by fibres that ``pull`` [MPa]: at most a ``share`` of the length."""
+        """Displacement [mm] of the surface, root mean square, where fibres ``pull`` [MPa] against the matrix: a ``share`` of the
+        length where they are far stronger.
+        """
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:

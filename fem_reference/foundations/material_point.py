@@ -67,7 +67,9 @@ class State:
     functions: Functions = NUMPY
 
     def share(self, region: str) -> Any:
-        """The share, 0 to 1, that the point has in a ``region``: a name, ``"not NAME"`` for the rest, ``""`` for the whole body."""
+        """The share, from 0 to 1, that the point has in a ``region``: a name, ``"not NAME"`` for the rest of the body, or ``""``
+        for all of it.
+        """
         if region.startswith(REST):
             return 1 - self.regions[region.removeprefix(REST)]
         return self.regions[region] if region else 1.0

@@ -24,7 +24,10 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Quadric:
-    """An ellipsoid of semi-axes ``radii`` (3,) [mm] (infinite: a cylinder) along its own axes, placed by ``pose`` (4, 4)."""
+    """An ellipsoid of semi-axes ``radii`` (3,) [mm] along its own axes, which ``pose`` (4, 4) takes to where they are.
+
+    An infinite radius makes it a cylinder.
+    """
 
     pose: Floats
     radii: Floats
@@ -73,7 +76,10 @@ class Quadric:
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """A torus about the third axis of ``pose`` (4, 4): a ``tube`` [mm] around a circle of ``radius`` [mm]; paths go through it."""
+    """A torus about the third axis of ``pose`` (4, 4): a ``tube`` [mm] around a circle of ``radius`` [mm].
+
+    Paths go through its hole.
+    """
 
     pose: Floats
     radius: float

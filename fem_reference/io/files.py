@@ -148,7 +148,9 @@ def read_rows(path: Path) -> list[list[str]]:
 
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
-    """The surface at ``positions`` (n, 3) [mm], by the suffix; in VTK's formats with point data ``displacement`` [mm], float64."""
+    """The surface with its points at ``positions`` (n, 3) [mm] in the format of the suffix; in VTK's with point data
+    ``displacement`` [mm], float64.
+    """
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
     assert write is not None  # of a suffix that is written

@@ -33,7 +33,9 @@ _SAME = 1e-9
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Over fibres, of ``r - r_reference`` [mm]: signed ``mean``, ``least``, ``greatest``; ``rms``, greatest magnitude ``max``."""
+    """Statistics over the fibres of ``r - r_reference`` [mm]: signed ``mean``, ``least`` and ``greatest``, ``rms``, and greatest
+    magnitude ``max``.
+    """
     if not context.joints or len(run.numbers) < 2:
         return ()
     found, expected = both_lengths(run, reference, context)

@@ -114,7 +114,9 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
 
 
 def joined(pieces: Mapping[str, Cells]) -> Cells:
-    """The mesh of separate ``pieces`` of one kind and degree; a region ``x1`` of the piece ``left`` becomes ``left_x1``."""
+    """The mesh of separate ``pieces``, all of one kind and degree. A region is named after its piece and its region there, as in
+    ``left_x1``.
+    """
     meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
     if len(kinds) != 1:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")

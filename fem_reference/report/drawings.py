@@ -147,7 +147,9 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """A legend above, in columns as texts leave room, the mark of what is no number last; beyond 3 rows the figure grows."""
+    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last; beyond three rows
+    the figure grows with them.
+    """
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]

@@ -72,7 +72,10 @@ class PageHead:
 
 
 def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
-    """Write the page ``name`` and its numbers into ``folder``, each whole or not at all, once all are made; its path."""
+    """Write the page ``name`` and its numbers into ``folder``; its path.
+
+    All files are made before the first is written, and each appears whole or not at all.
+    """
     beside = page.numbers_name or name
     texts = {} if page.numbers is None else {f"{beside}.json": json.dumps(page.numbers, indent=1, allow_nan=False)}
     texts |= {f"{beside}.csv": page.rows} if page.rows else {}

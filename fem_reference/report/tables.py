@@ -96,7 +96,9 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """Forces [N] and moments about the origin [N mm] on each bone, as recorded: measures of lengths, by bone, and components."""
+    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their lengths, by the
+    name of the bone, and their components.
+    """
     found = list[Measure]()
     for kind, unit in {"force_on_": "N", "moment_on_": "N mm"}.items():
         parts = {name.removeprefix(kind): values for name, values in run.scalars.items() if name.startswith(kind)}

@@ -132,7 +132,9 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """Arrays of an .npz file by name: ``names`` (default: all), of ``also`` those there are; InputError where damaged."""
+    """The arrays of an .npz file by name: those of ``names``, by default all, and of ``also`` those that are there; InputError
+    where it is damaged.
+    """
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:

@@ -116,7 +116,9 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The state of a frame (n, 3) [mm], its iterations, whether they met the tolerance, if any, and its trouble, if any."""
+    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and the
+    trouble with it, if any.
+    """
 
     points: Floats
     iterations: int

@@ -27,7 +27,9 @@ Four = tuple[float, float, float, float]
 
 
 class Contacts(NamedTuple):
-    """The checked vertices (k,), their values of the constraint (k,) [mm], and the unit vectors (k, 3) along which these grow."""
+    """The checked vertices (k,), their values of the constraint (k,) [mm], and the unit vectors (k, 3) along which these
+    increase.
+    """
 
     vertices: Ints
     value: Floats

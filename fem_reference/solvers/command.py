@@ -238,7 +238,9 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, with the frames in ``out`` up to the first that is missing or damaged."""
+    """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
+    missing or damaged.
+    """
     kept, trouble, cost = 0, None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)

@@ -118,7 +118,9 @@ def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
 
 
 def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wraps]:
-    """Lines and obstacles; InputError below ``place`` where the case lacks what they need or a fixed point begins inside one."""
+    """The lines and the obstacles; InputError below ``place`` where the case has not what they need, or a fixed point is inside an
+    obstacle at the first frame.
+    """
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
     wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)

@@ -67,7 +67,10 @@ def move(points: Floats, i: int, factor: float, direction: Vector) -> None:
 
 @compiled
 def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
-    """Distance of two points [mm] and its gradient at ``p1``, minus that at ``p2``; zero where they coincide. Eq. 5.15-5.17."""
+    """Distance of two points [mm] and its gradient at ``p1``, minus that at ``p2``. Eq. 5.15-5.17.
+
+    The gradient is zero where the points coincide.
+    """
     apart = minus(p1, p2)
     length = math.sqrt(dot(apart, apart))
     return length, (times(1 / length, apart) if length > 0 else _ZERO)
@@ -235,7 +238,10 @@ def pull_distances(
 def pull_volume(
     points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, softness: float, multiplier: float
 ) -> float:
-    """One projection of six times the volume, ``rest`` [mm3] at rest, ``softness`` a [mm4/t]; the multiplier after it."""
+    """One projection of six times the volume inside ``triangles`` (m, 3), ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
+
+    Returns the multiplier after it.
+    """
     value, gradient = volume(points, triangles)
     weight = 0.0
     for i in range(len(points)):

@@ -205,7 +205,10 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """Voxels (k, k, k) that a flood from (0, 0, 0) reaches by faces, not into the ``border`` nor back to an index of 0."""
+    """The voxels (k, k, k) that a flood from the corner (0, 0, 0) gets to, from face to face and not into the ``border``.
+
+    It never goes back to an index of 0.
+    """
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]

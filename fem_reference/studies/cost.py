@@ -124,7 +124,9 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """Settings of a trial that differ from the solver's defaults, whoever states the others, and the hash of a program."""
+    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not, and the hash of
+    a program.
+    """
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)

@@ -28,7 +28,9 @@ class _Ended:
 
 
 def shipped_law() -> Fitted:
-    """The shipped law fitted to the cubes of Van Loocke et al. by its shear modulus; fibres stay: a scale changes no ratio."""
+    """The shipped law, fitted to the cubes of Van Loocke et al. by its shear modulus; its fibres stay, as ratios of stresses do not
+    change with the scale of both.
+    """
     to = [one for one in QUANTITIES if one.experiment == LOOCKE and not one.is_order]
     ended = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
     (shear,) = ended.parameters
@@ -39,7 +41,9 @@ def shipped_law() -> Fitted:
 
 
 def collagen_law(most: int = _MOST) -> Fitted:
-    """The law with collagen across the fibres, fitted to all but orders, which have no slope; no published range."""
+    """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at most so many
+    evaluations; no published range.
+    """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)
     fibres, k1, k2 = ended.parameters

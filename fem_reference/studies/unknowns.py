@@ -36,7 +36,9 @@ class Unknowns:
         return first != "effect" or others[0] in self.kept
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that have a range; InputError without any, or where the case states one of an effect it leaves out."""
+        """The parameters that have a range; InputError where there are none, or the case states one of an effect that it
+        leaves out.
+        """
         case, found = self.whole, []
         self._check()
         for key, one in ranges.ranges(case).items():

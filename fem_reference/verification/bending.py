@@ -37,7 +37,9 @@ def flexed(thickness: float, length: float, angle: float, points: Floats, frame:
 
 
 def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """A reading of the half y >= 0 in 2n by 2n by 1 cells, whose lateral ``faces`` stay in their planes; ``mu`` [MPa]."""
+    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in their planes; ``mu``
+    [MPa].
+    """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
     end = Prescribed("y1", "y1", (0, 1, 2), partial(flexed, THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
@@ -95,7 +97,9 @@ def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect
 
 
 def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> float:
-    """Torque per twist [N mm2] by a quarter of the bar (displacements are antisymmetric), ends ``turned`` along these axes."""
+    """Torque per twist [N mm2]. A quarter of the bar, as small displacements are antisymmetric about the planes of its axis; its
+    ends are ``turned`` along these axes.
+    """
     half = SIDE / 2
     mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
     turn = Turn((0.0, 0.0, 1.0), SMALL_TWIST, per_length=True)

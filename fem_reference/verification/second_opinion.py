@@ -132,7 +132,9 @@ BLOCK_RULES = (
 
 
 class Tolerance(NamedTuple):
-    """A tolerance and its reason, for a ``residual`` [N, mm3] and rules of degree ``quadrature`` (None: the solver's own)."""
+    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of the degree ``quadrature``, None: each
+    solver's own.
+    """
 
     within: float
     because: str

@@ -47,7 +47,9 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """States of the block down and on a share ``back`` of the return: at even steps, or ``growing`` at the ends of both paths."""
+    """All states of the block on the path down and on a share ``back`` of the return: at even steps, or where they are
+    ``growing`` at the ends of both paths.
+    """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
     # Every state by Newton's method, those of the return path too.
     solved = plated(lab, element, bulk, path, frames(2, 2 if growing else 2 * STEPS), first_step=0.05, reuse=False)

@@ -22,7 +22,9 @@ _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; an exception, such as ValueError, where it is none or not whole. Only points and cells are read."""
+    """The data set of a file; ValueError or another exception where it is none, or not whole. Sections other than points and cells
+    are skipped, to their end.
+    """
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no head of a VTK file")

@@ -24,7 +24,9 @@ _PARTS = 16
 
 
 class FrameModel(Protocol):
-    """A model of a muscle that goes from frame to frame; the loop adds to its ``cost``, and gives its ``advice`` in trouble."""
+    """A model of a muscle that advances from frame number to frame number; the loop adds to its ``cost``, and gives its ``advice``
+    for a run that ends in trouble.
+    """
 
     cost: dict[str, float]
     advice: str

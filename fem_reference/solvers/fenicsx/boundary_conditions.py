@@ -90,7 +90,9 @@ class PointSprings:
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the spring forces to ``residual`` over this rank's unknowns, linearly advanced by ``moves`` (n,) where given."""
+        """Add the spring forces to ``residual`` over this rank's unknowns; linearly advanced by ``moves`` (n,) of them, where
+        given.
+        """
         now = self.unknowns.x.array
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 

@@ -77,7 +77,9 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """Places of each cell's entries (m, u, u) in ``structure``; those of ``fixed`` (n,) unknowns share one after the last."""
+        """The places of each cell's entries (m, u, u) among those of ``structure``; entries of a ``fixed`` (n,) unknown share one
+        place after the last.
+        """
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         arrays: tuple[NDArray[Any], ...] = self.unknowns, structure.starts, structure.columns, fixed.view(np.int8)
         size = ctypes.c_int(len(structure.columns))
@@ -165,7 +167,9 @@ class CellSums:
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
-        """Cells by chunks: first and second derivatives of the energy at points (m, q, v), and their volumes (m, q) [mm3]."""
+        """Cells a chunk at a time: first and second derivatives of the present energy at their points (m, q, v), and the volumes
+        (m, q) [mm3] of these.
+        """
         for some in self._chunks():
             cells = np.arange(some.start, some.stop, dtype=np.int32)
             slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])

@@ -35,7 +35,9 @@ class ContactPoints:
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
     def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at all or ``some`` (n,) points to ``residual`` over this rank's unknowns."""
+        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual`` over this rank's
+        unknowns.
+        """
         shares = self.carried.shares if some is None else self.carried.shares[some]
         residual[self.carried.dofs] += shares.T @ forces  # each unknown once
 

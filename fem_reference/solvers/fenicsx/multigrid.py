@@ -59,7 +59,9 @@ class Multigrid:
         return False
 
     def _renew(self) -> None:
-        """Build the preconditioner of the present matrix: the pressure first, from the volume residual; then the displacement."""
+        """Build the preconditioner of the present matrix: first the pressure, from the volume residual; then the displacement, from
+        the remaining forces.
+        """
         with self.spent.on("factorisation"):
             kinds: Any = PETSc.PC  # its stubs call their members numbers
             blocks = PETSc.PC().create(self.matrix.comm)

@@ -21,7 +21,9 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves problems on ``ranks`` in a subprocess, started anew after it died; jobs and frames are passed in a ``folder``."""
+    """Solves problems on ``ranks`` in a subprocess of its own, which is restarted after it died; jobs and frames are passed in a
+    ``folder``.
+    """
 
     def __init__(self, folder: Path, ranks: int) -> None:
         self.folder, self.ranks = folder.resolve(), ranks  # the process may have been started elsewhere

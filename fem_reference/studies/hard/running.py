@@ -73,7 +73,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Every solver, or ``only`` these, and ``own`` on each case, the reference first; also ``in_steps`` and ``jitters``."""
+    """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
+    so many ``jitters``.
+    """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     limit = {"time_limit": f"{LIMIT:g} s"}
