@@ -24,7 +24,7 @@ autodoc_typehints = "description"
 autodoc_member_order = "bysource"
 html_theme = "furo"
 html_static_path = ["_static"]
-html_css_files = ["house.css"]
+html_css_files, html_js_files = ["house.css"], ["house.js"]
 # Drawings name their colours, and are seen on dark paper in those that the pages of results have there.
 html_theme_options = {"dark_css_variables": drawn_results.dark_colours()}
 html_show_sourcelink = False

@@ -108,7 +108,7 @@ MISTAKES = (
 )
 
 
-def touching_denials(lab: Lab, farther: float) -> Finding:
+def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
     """The number of checks that are not met by two blocks pressed together, the side of one then moved ``farther`` [mm] into the
     other.
     """
@@ -121,16 +121,14 @@ def touching_denials(lab: Lab, farther: float) -> Finding:
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
-BAR = "a bar between two bones, into which a ball is pressed,"
-BLOCKS = "two blocks pressed together"
-ENTRIES = tuple(
-    Entry(
+def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **mistake: object) -> Entry:
+    return Entry(
         name=f"second_check_{name}",
         group="second check",
         title=f"A run of {what} passes the second check; not with {words}",
         unit="1",
         measure=measure,
-        given=given,
+        given={},
         **control(words, **mistake),
         truth=0.0,
         within=0.5,
@@ -138,8 +136,11 @@ ENTRIES = tuple(
         kind="property",
         source="fem_reference/assessment/run_checks.py",
     )
-    for name, what, words, measure, given, mistake in (
-        *((name, BAR, words, denials, {}, {"mistake": mistake}) for name, words, mistake in MISTAKES),
-        ("touching", BLOCKS, "one 0.1 mm farther in the other", touching_denials, {"farther": 0.0}, {"farther": 0.1}),
-    )
+
+
+BAR = "a bar between two bones, into which a ball is pressed,"
+BLOCKS = "two blocks pressed together"
+ENTRIES = (
+    *(_entry(name, BAR, words, denials, mistake=mistake) for name, words, mistake in MISTAKES),
+    _entry("touching", BLOCKS, "the side of one 0.1 mm farther in the other", touching_denials, farther=0.1),
 )

@@ -161,7 +161,7 @@ class Pass:
         near = self.met(now, self.law.smoothing)
         facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
         lost = (np.isin(near.points, pressed) & facing) | (near.gap < -self.law.smoothing)
-        return near.points[lost & ~np.isin(near.points, met)]
+        return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
     def _passed(self, starts: Floats, ends: Floats, old: Floats, new: Floats, free: Floats) -> Ints:
         """The ``free`` points (n,) that pass a facet on their path."""
