@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,9 +41,13 @@ def kept(name: str) -> dict[str, Any]:
 def table(name: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A table in Markdown, and below it where its numbers come from."""
     lines = [list(head), ["---"] * len(list(head)), *([str(cell) for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin(name)}</small>\n"
+
+
+def origin(name: str) -> str:
+    """The command of a kept measurement, and when and where it was made."""
     file = kept(name)
-    origin = f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin}</small>\n"
+    return f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -251,6 +256,24 @@ def _study_reference() -> str:
     return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
 
 
+def _fronts(found: dict[str, Any]) -> Any:
+    """A study of all solvers, with the errors and costs that are drawn."""
+    case = found["cases"][0]
+    errors, costs = (_SURFACE, "fibre_length.rms_percent"), ("seconds_per_frame", _TIME, "unknowns", fronts.LOAD)
+    points = [
+        one | {"errors": _only(one["errors"], errors), "costs": _only(one["costs"], costs)} for one in case["points"]
+    ]
+    drawn = {"points": points, "claims": [one for one in case["claims"] if one["metric"] == "surface_deviation"]}
+    names = (field.name for field in fields(cost_study.CaseStudy))
+    return (
+        {name: case[name] for name in names} | drawn | {name: _only(case[name], errors) for name in ("units", "bars")}
+    )
+
+
+def _only(found: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    return {name: found[name] for name in names if name in found}
+
+
 def _stress(found: dict[str, Any]) -> Any:
     counts = [
         {"solver": name} | Counter(one["verdict"] for one in found["cells"] if one["solver"] == name)
@@ -320,6 +343,11 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
+    "fronts": Measurement(
+        "./fem study hip_flexion --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --solver fenicsx "
+        "--solver xpbd --solver pbd --solver arap --solver arap_pbd --solver mass_spring --solver viper",
+        _fronts,
+    ),
     "stress": Measurement("./fem stress --steps", _stress),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "credibility": Measurement("./fem page credibility", _credibility),

@@ -74,8 +74,8 @@ class AssembledBody:
         self.path = Path(self.system, self.determinants)
         if form.rest is not None:
             self.path.settle(self.energy(), connected=False)
-        contacts = (one for one in (self.contact, self.touching) if one is not None)
-        self.checks: tuple[StateCheck, ...] = *contacts, self.determinants, self.validity, self.path, self
+        self.contacts = tuple(one for one in (self.contact, self.touching) if one is not None)
+        self.checks: tuple[StateCheck, ...] = *self.contacts, self.determinants, self.validity, self.path, self
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
@@ -106,6 +106,8 @@ class AssembledBody:
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
+        if self.touching:
+            self.touching.settle()
         self.path.settle(self.energy(), connected=False)
 
     @property
@@ -153,8 +155,8 @@ class AssembledBody:
             self.system.contact = contact
             if self.contact:
                 self.contact.update(frame)
-        if self.contact:
-            self.contact.settle()
+        for one in self.contacts:
+            one.settle()
         self.clock.settle(frame, after)
         self.at = frame
 
@@ -197,8 +199,8 @@ class AssembledBody:
     def arrive(self, frame: float) -> None:
         """Take the present state as that of ``frame``; no load step led to it."""
         self.at = frame
-        if self.contact:
-            self.contact.settle()
+        for one in self.contacts:
+            one.settle()
         self.path.settle(self.energy(), connected=False)
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
