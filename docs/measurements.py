@@ -22,14 +22,17 @@ _COUNTED = {verdict: (verdict,) for verdict in VERDICTS if verdict not in _TWO} 
 # Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
 _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
+# Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
+_FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
 
 
 class Measurement(NamedTuple):
-    """A ``command``; ``keep`` picks from its JSON what tables need."""
+    """A ``command``; ``keep`` picks from its JSON what tables need; made of each of the ``cases``, if any, in place of CASE."""
 
     command: str
     keep: Callable[[Any], Any]
+    cases: tuple[str, ...] = ()
 
 
 def kept(name: str) -> dict[str, Any]:
@@ -249,6 +252,47 @@ def _study_reference() -> str:
     return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
 
 
+def _fibre_ends(found: dict[str, Any]) -> Any:
+    rows = []
+    for case, one in found.items():
+        facts = {key: value for key, value in one["mesh"].items() if key.startswith("fibre_end")}
+        covered = {key[:-16]: value for key, value in one["mesh"].items() if key.endswith("_covered_percent")}
+        ends = [each for each in one["measures"] if each["metric"] == "fibre_ends" and each["statistic"] == "max"]
+        off = {each["frame"]: each["value"] for each in ends if each["candidate"] == "reference" and each["frame"]}
+        rows.append({"case": case, "status": one["status"], "facts": facts, "covered": covered, "off": off})
+    return rows
+
+
+def _fibre_ends_rows() -> str:
+    rows = []
+    for one in kept("fibre_ends")["measured"]:
+        covered = ", ".join(f"{name} {value:.0f}" for name, value in one["covered"].items())
+        facts = one["facts"]
+        by = "by a tendon: " if "fibre_ends_on_by_tendon" in facts else ""
+        words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_on_by_tendon", "")
+        named = [f"{end} of {fibre} {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
+        off = [f"{value:.1f}" if value is not None else one["status"] for value in one["off"].values()] or [
+            one["status"]
+        ]
+        rows.append(
+            (
+                f"`{one['case']}`",
+                covered,
+                f"{facts['fibre_ends']:.0f}",
+                by + (", ".join(named) or "none"),
+                ", ".join(off),
+            )
+        )
+    head = (
+        "case",
+        "covered by ends, %",
+        "ends",
+        "more than 2 mm from their attachment",
+        "worst end off its bone, 0.5, 1 rad, mm",
+    )
+    return table("fibre_ends", head, rows)
+
+
 def _stress(found: dict[str, Any]) -> Any:
     counts = [
         {"solver": name} | Counter(one["verdict"] for one in found["cells"] if one["solver"] == name)
@@ -317,6 +361,15 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
+    "fibre_ends": Measurement(
+        "./fem run CASE --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --set expect=[]",
+        _fibre_ends,
+        (
+            *("hip_flexion", "hip_flexion_tendon", "adductor_brevis", "gluteus_medius", "gluteus_medius_anatomical"),
+            *("iliacus", "iliacus_anatomical", "iliacus_in_situ"),
+            *("gluteus_maximus", "gluteus_maximus_anatomical", "gluteus_maximus_tract"),
+        ),
+    ),
     "stress": Measurement("./fem stress --steps", _stress),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "credibility": Measurement("./fem page credibility", _credibility),
@@ -332,6 +385,7 @@ TABLES = {
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
     "study_reference": _study_reference,
+    "fibre_ends": _fibre_ends_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
     "uncertainty_bands": _uncertainty_bands,
