@@ -44,12 +44,12 @@ class Process:
     @property
     def first(self) -> Floats:
         """The share (d,) of the variance by each variable alone."""
-        return self._shares[0]
+        return np.asarray(self._shares[0])
 
     @property
     def total(self) -> Floats:
         """The share (d,) of the variance by each variable alone and with others."""
-        return self._shares[1]
+        return np.asarray(self._shares[1])
 
     @cached_property
     def _shares(self) -> Floats:
@@ -62,7 +62,7 @@ class Process:
         for i in range(variables):
             mixed = self(np.where(np.arange(variables) == i, other, one))
             shares.append((((there - here.mean(axis=0)) * (mixed - here)).mean(), ((here - mixed) ** 2).mean() / 2))
-        return np.array(shares).T * here.shape[1] / here.var(axis=0).sum()
+        return np.asarray(np.array(shares).T * here.shape[1] / here.var(axis=0).sum())
 
 
 def fit(points: Floats, outputs: Floats) -> Process:
