@@ -35,7 +35,7 @@ def scene_of(options: argparse.Namespace) -> Case:
     case = of_case.chosen(read)
     units = metrics.units(against=case.standards("candidates"))
     asked = (_expectation(text, units) for text in options.limit)
-    return case.model_copy(update={"expect": (*case.expect, *asked)})
+    return case.expecting(tuple(asked))
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
@@ -116,7 +116,8 @@ def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[t
     if options.error_bar:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
-    judge.check(scene)
+    for one in scene.parts or (scene,):
+        judge.check(one)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     bench.check(chosen)
     return bench
@@ -158,14 +159,39 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
 
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
+    bench = checked_bench(case, options, chosen)
+    if case.parts:
+        return _compared_muscles(bench, options, chosen)
     with fenicsx.shared():
-        result = judging.judged(checked_bench(case, options, chosen), chosen, error_bars=options.error_bar)
+        result = judging.judged(bench, chosen, error_bars=options.error_bar)
     alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     wanted = asked("run" if alone else "compare", case, options, "report", *who)
     text = "\n".join([comparison_text(result), *unturned(options, result.word)])
     publish(options, wanted, report.of_comparison(result), report.summary(result), text)
     return status([result])
+
+
+def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Measure and judge each of several muscles, and write a page for each."""
+    with fenicsx.shared():
+        found = judging.by_muscle(bench, chosen)
+    case, who = bench.scene, candidates(bench.scene, [entry for entry, _ in chosen])
+    texts, pages, facts = list[str](), list[str](), dict[str, Any]({"case": case.name, "muscles": {}})
+    for name, result in found.muscles.items():
+        texts.append(f"{name}:\n{comparison_text(result)}")
+        facts["muscles"][name] = report.summary(result)
+    facts["penetration"], word = found.penetration, judge.overall(result.word for result in found.muscles.values())
+    texts += [
+        f"{who}: {one} and {other} in each other by {depth:.3g} mm (frame {frame})"
+        for who, one, other, depth, frame in found.worst
+    ]
+    write_output(facts, "\n".join([*texts, judging.ALONE, *unturned(options, word)]), options)
+    for name, result in found.muscles.items():
+        wanted = asked("compare", case, options, f"report_{name}", *who)
+        pages += written(wanted, report.of_comparison(result), out(options), options.page_name)[1]
+    print(*pages, sep="\n")
+    return status(found.muscles.values())
 
 
 def unturned(options: argparse.Namespace, word: str) -> list[str]:

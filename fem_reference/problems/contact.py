@@ -45,6 +45,9 @@ class ContactLaw:
 
     ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
     there, with the pressure that balances the tension (``effects.in_situ``); later a point feels the change of its gap.
+
+    ``parts``: of several bodies solved as one, the name of each, its first point of the skin, and the one after its last: forces
+    are then reported by body too.
     """
 
     on: str | Skin
@@ -52,6 +55,7 @@ class ContactLaw:
     smoothing: float
     relaxed: tuple[float, float] | None = None
     in_situ: float | None = None
+    parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
@@ -66,8 +70,13 @@ class ContactLaw:
         """The share of the overlap at rest that is subtracted at ``frame``."""
         if self.relaxed is None:
             return float(self.in_situ is not None)
-        first, last = self.relaxed
-        return float(np.clip((last - frame) / (last - first), 0, 1))
+        return remaining(self.relaxed, frame)
+
+
+def remaining(relaxed: tuple[float, float], frame: float) -> float:
+    """The share of an overlap at rest that is left at ``frame``, as it is removed between two frame numbers."""
+    first, last = relaxed
+    return float(np.clip((last - frame) / (last - first), 0, 1))
 
 
 def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:

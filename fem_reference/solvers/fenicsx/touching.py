@@ -35,9 +35,25 @@ class TouchingForces:
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
         ]
-        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching)]:
-            if depth > law.smoothing:
+        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching if not law.relaxed)]:
+            if depth > law.smoothing and not law.relaxed:
                 raise ArithmeticError(f'"{law.one}" and "{law.other}" overlap by {depth:.3g} mm')
+        self.overlap = max((depth for _, depth in depths), default=0.0)
+        for one, (met, _) in zip(self.passes, self.now, strict=True):
+            if one.law.relaxed:
+                one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
+        self.move_to(body.frames[0])
+
+    def move_to(self, frame: float) -> None:
+        """Subtract what is left at ``frame`` of overlaps at rest."""
+        for one in self.passes:
+            if (share := one.law.allowance(frame)) != one.share:
+                one.share = share
+                self.seen[:] = np.nan
+
+    def acting(self) -> list[float]:
+        """The shares of overlaps at rest that are subtracted."""
+        return [one.share for one in self.passes]
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
@@ -95,7 +111,7 @@ class TouchingForces:
         gaps = np.concatenate([met.gap for met, _ in self.now])
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
-            "touching_pressure": max(float(one.law.pressure(met.gap)[0].max(initial=0.0)) for one, (met, _) in pairs),
+            "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
         }
