@@ -20,7 +20,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import COMMAND, HOME, Candidate, Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import judging
+from fem_reference.studies import by_muscle, judging, refinement
 from fem_reference.studies.execution import Bench
 
 
@@ -157,13 +157,20 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
     print(*written(asked, page, out(options), options.page_name)[1], sep="\n")
 
 
+def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Comparison:
+    """The runs of a case, measured and judged with the error bars that are asked for or cheap."""
+    reference, *runs = bench.runs(chosen)
+    bars = refinement.offered(bench, reference, asked=options.error_bar)
+    return judging.compare(bench, reference, runs, bars)
+
+
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
     bench = checked_bench(case, options, chosen)
     if case.parts:
         return _compared_muscles(bench, options, chosen)
     with fenicsx.shared():
-        result = judging.judged(bench, chosen, error_bars=options.error_bar)
+        result = judged(bench, options, chosen)
     alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     wanted = asked("run" if alone else "compare", case, options, "report", *who)
@@ -175,7 +182,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge each of several muscles, and write a page for each."""
     with fenicsx.shared():
-        found = judging.by_muscle(bench, chosen)
+        found = by_muscle.compared(bench, chosen)
     case, who = bench.scene, candidates(bench.scene, [entry for entry, _ in chosen])
     texts, pages, facts = list[str](), list[str](), dict[str, Any]({"case": case.name, "muscles": {}})
     for name, result in found.muscles.items():
@@ -186,7 +193,7 @@ def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: li
         f"{who}: {one} and {other} in each other by {depth:.3g} mm (frame {frame})"
         for who, one, other, depth, frame in found.worst
     ]
-    write_output(facts, "\n".join([*texts, judging.ALONE, *unturned(options, word)]), options)
+    write_output(facts, "\n".join([*texts, by_muscle.ALONE, *unturned(options, word)]), options)
     for name, result in found.muscles.items():
         wanted = asked("compare", case, options, f"report_{name}", *who)
         pages += written(wanted, report.of_comparison(result), out(options), options.page_name)[1]

@@ -214,6 +214,11 @@ class Body:
         return next((frames[1] for frames in relaxed if frames is not None), self.frames[0])
 
     @property
+    def rubs(self) -> bool:
+        """True with friction, where a state depends on the path to it."""
+        return self.contact is not None and self.contact.friction is not None
+
+    @property
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
         return diagonal(self.mesh.points)

@@ -158,10 +158,10 @@ def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Contact
     ends = np.cumsum([0, *(len(law.on.points) for law in laws.values())]).tolist()
     skins = [_moved(law.on, ranges[name][0]) for name, law in laws.items()]
     skin = Skin(*(np.concatenate([getattr(one, key) for one in skins]) for key in ("cells", "points", "areas")))
-    known = {(law.stiffness, law.smoothing, law.in_situ) for law in laws.values()}
+    known = {(law.stiffness, law.smoothing, law.in_situ, law.friction) for law in laws.values()}
     if len(known) > 1 or len(laws) < len(bodies):
         raise InputError("contact", "contact that differs or that some have not", "the same of all")
     relaxed = next((law.relaxed for law in laws.values() if law.relaxed is not None), None)
     parts = tuple(zip(laws, ends, ends[1:], strict=False))
-    some = next(iter(laws.values()))
-    return ContactLaw(skin, some.stiffness, some.smoothing, relaxed, some.in_situ, parts=parts)
+    some: ContactLaw = next(iter(laws.values()))
+    return replace(some, on=skin, relaxed=relaxed, parts=parts)

@@ -2,16 +2,14 @@
 
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fem_reference import solvers
-from fem_reference.assessment import comparison, neighbours
+from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
@@ -19,94 +17,19 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.geometry.field_mesh import l2_distance
 from fem_reference.problems import of_case, scalar
-from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run, complete
-from fem_reference.runs.views import run_of
-from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.scalar import Element, ScalarCase
-from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# A remark on the candidates of several muscles.
-ALONE = "Each candidate solves each muscle by itself: it knows nothing of the other muscles."
 
 _REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
 _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
-
-
-def judged(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> Comparison:
-    """The reference of a case and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
-    read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
-    reference = bench.reference()
-    runs = [read.get(entry.name) or bench.obtain(entry.name, entry, place) for entry, place in chosen]
-    return compare(bench, reference, runs, refinement.offered(bench, reference, asked=error_bars))
-
-
-@dataclass(frozen=True, eq=False)
-class ByMuscle:
-    """Comparisons of the ``muscles`` of a case by name. ``worst``: for each solver that has two of them, the solver, the two, the
-    greatest depth [mm] to which they are in each other, and its frame.
-    """
-
-    muscles: dict[str, Comparison]
-    worst: tuple[tuple[str, str, str, float, int], ...]
-
-    @property
-    def penetration(self) -> list[dict[str, object]]:
-        """The depths as rows."""
-        names = ("solver", "muscle", "other", "depth_mm", "frame")
-        return [dict(zip(names, row, strict=True)) for row in self.worst]
-
-
-def views(bench: Bench[Any], run: Run) -> dict[str, Run]:
-    """The ``run`` of several muscles as one of each, by name."""
-    problem, parts = bench.problem(), bench.parts
-    assert isinstance(problem, MusclesProblem)
-    found = {name: run_of(run, problem, name) for name in parts}
-    return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
-
-
-def by_muscle(bench: Bench[Any], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
-    """The comparison of each muscle of a case of several: with the one reference of all, and with candidates that solve it alone.
-    Frames are read from folders with the names of the muscles; a candidate may lack some.
-    """
-    parts, found = bench.parts, dict[str, Comparison]()
-    for entry, place in chosen:
-        if all(_own((entry, place), name) is None for name in parts):
-            want = f"folders {' or '.join(parts)} in it, with the frames of these muscles"
-            raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
-    reference = bench.reference()
-    whole = views(bench, reference)
-    runs: dict[str, dict[str, Run]] = {"reference": whole}
-    for name, part in parts.items():
-        own = [one for one in (_own(entry, name) for entry in chosen) if one is not None]
-        solved = [part.obtain(entry.name, entry, place) for entry, place in own]
-        for run in solved:
-            runs.setdefault(run.name, {})[name] = complete(run, part.scene.numbers)
-        found[name] = compare(part, whole[name], solved)
-    return ByMuscle(found, tuple(_worst(runs)))
-
-
-def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate with its place, its frames those of the muscle of a ``name``; None where it has none of it."""
-    entry, place = chosen
-    if entry.solver != "recorded":
-        return chosen
-    folder = Path(entry.settings["folder"]) / name
-    return (entry.model_copy(update={"folder": str(folder)}), place) if folder.exists() else None
-
-
-def _worst(runs: dict[str, dict[str, Run]]) -> Iterator[tuple[str, str, str, float, int]]:
-    """The rows of ``ByMuscle.worst``."""
-    for who, own in runs.items():
-        for one, other, depth in neighbours.depths(own):
-            at = int(np.nanargmax(depth)) if np.isfinite(depth).any() else 0
-            yield who, one, other, float(depth[at]), own[one].numbers[at]
 
 
 def compare(

@@ -9,11 +9,11 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
-from fem_reference.problems.overlaps import overlap
+from fem_reference.problems.overlaps import beyond_rim, overlap
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.meshes import Displacement
+from fem_reference.solvers.fenicsx.meshes import Displacement, local_facets
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
 
@@ -29,9 +29,10 @@ class TouchingForces:
         for law in body.touching:
             low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
             self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
+        self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
-        self.look()
+        self.settle()
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
         ]
@@ -54,6 +55,15 @@ class TouchingForces:
     def acting(self) -> list[float]:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
+
+    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
+        """By pass the skin around the other part, that its points may not touch; None where there is none."""
+        pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
+        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
+        return [
+            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
+            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
+        ]
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
@@ -104,25 +114,35 @@ class TouchingForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
-        ``touching_area`` [mm2], the mean of both sides; and the number of points under pressure, ``touching_points``.
+        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; and the depth of
+        the deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed.
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
+        removed = any(one.law.relaxed for one in self.passes)
         gaps = np.concatenate([met.gap for met, _ in self.now])
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
             "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
-        }
+        } | ({"touching_overlap_at_rest": self.overlap} if removed else {})
+
+    def settle(self) -> None:
+        """Take the present state as the start of the next step."""
+        self.look()
+        self.settled = [met for met, _ in self.now]
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """Diverged where a point went through the other part since the unknowns ``before`` (n,)."""
+        """Diverged where a point went through the other part since the unknowns ``before`` (n,), or past its rim."""
         self.look()
-        for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if len(lost := one.through(before, self.seen, met)):
+        for one, rim, last, (met, _) in zip(self.passes, self.rims, self.settled, self.now, strict=True):
+            lost, how = one.through(before, self.seen, met), "went through the other side"
+            if rim and not len(lost):
+                lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
+            if len(lost):
                 where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
-                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} went through the other side")
+                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")
         return None
 
 
