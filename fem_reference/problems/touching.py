@@ -13,15 +13,17 @@ from fem_reference.problems.contact import penalty
 
 @dataclass(frozen=True)
 class Touching:
-    """Frictionless contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
+    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
     facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
+    ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without.
     """
 
     one: str
     other: str
     stiffness: float
     smoothing: float
+    friction: float | None = None
 
     @property
     def forces(self) -> tuple[str, str]:
