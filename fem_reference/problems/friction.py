@@ -22,7 +22,7 @@ def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
 
 
 class Returned(NamedTuple):
-    """Of n points: the traction over the elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
+    """Traction of n points over their elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
     length of the elastic slip and ``by_limit`` (n,) by the limit of the traction.
     """
 

@@ -35,7 +35,7 @@ class Rubbed:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class Sliding:
     """The change of the place of n points on their facets: its derivative ``A`` (n, 2, 12) by the twelve, second derivatives ``Q``
     (n, 2, 12, 12), and the ``metric`` (n, 2, 2) with its derivative ``turn`` (n, 2, 2, 12).
     """
@@ -46,7 +46,7 @@ class Place:
     turn: Floats
 
 
-def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Place:
+def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Sliding:
     """The derivatives of the coordinates of the place nearest to a point at ``gap`` (n,) [mm], by ``y' (x - y) = 0``.
 
     With the slopes y' of the facet, ``R = x - y = g n`` and ``m = a - g b`` the first is ``m^-1 (y' (dx - dy) + R dy')``, and the
@@ -79,7 +79,7 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Plac
     for b in (0, 1):
         slopes[:, b, :, 3 + 3 * b : 6 + 3 * b] += np.eye(3)
     turn = np.einsum("nai,nbir->nabr", y, slopes)
-    return Place(A, np.einsum("nab,nbrs->nars", inverse, S), there.metric, turn + np.swapaxes(turn, 1, 2))
+    return Sliding(A, np.einsum("nab,nbrs->nars", inverse, S), there.metric, turn + np.swapaxes(turn, 1, 2))
 
 
 class Rubbing:
@@ -130,7 +130,7 @@ class Rubbing:
             self.other.beyond(met.there.at - whole),
         )
 
-    def _slipped(self, met: Met, unknowns: Floats, tables: Floats) -> tuple[Place, Floats, Floats, Floats]:
+    def _slipped(self, met: Met, unknowns: Floats, tables: Floats) -> tuple[Sliding, Floats, Floats, Floats]:
         """The change of the places; their whole way (n, 2) on the facets since the settled state, the part ``elastic`` (n, 2) that
         counts as slip, and its derivative (n, 2, 12). The ``tables`` are those of the facets' functions.
         """
