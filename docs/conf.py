@@ -7,6 +7,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import drawn_results
 import reference_pages
 
 import fem_reference
@@ -21,21 +22,19 @@ exclude_patterns = ["_build"]
 myst_heading_anchors = 3
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
-html_theme = "alabaster"
-html_theme_options = {
-    "description": fem_reference.__doc__.splitlines()[0],
-    "page_width": "64rem",
-    "sidebar_width": "14rem",
-    "show_powered_by": False,
-}
+html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files, html_js_files = ["house.css"], ["house.js"]
+# Drawings name their colours, and are seen on dark paper in those that the pages of results have there.
+html_theme_options = {"dark_css_variables": drawn_results.dark_colours()}
 html_show_sourcelink = False
 html_title = f"fem_reference {release}"
 
 
 def fill(_app: Any, _page: str, source: list[str]) -> None:
     """What is generated in its places; files of the checkout, which are no pages, as their path."""
-    text = reference_pages.fill(source[0])
-    source[0] = re.sub(r"\[`?([^\]`]+)`?\]\(\.\./([^)#]+)\)", _path, text)
+    text = drawn_results.fill(reference_pages.fill(source[0]))
+    source[0] = re.sub(r"(?<!!)\[`?([^\]`]+)`?\]\(\.\./([^)#]+)\)", _path, text)
 
 
 def _path(link: re.Match[str]) -> str:

@@ -2,7 +2,7 @@
 
 ``python docs/measured.py`` writes each table into its place on the pages; ``python docs/measured.py NAME ...`` measures these anew
 before (minutes to an hour each), ``--from FOLDER`` takes what is already measured there. A place is ``<!-- measured: NAME -->``
-up to ``<!-- end -->``.
+up to ``<!-- end -->``; ``<!-- written: NAME -->`` is that of a table made from the records that read files.
 """
 
 import argparse
@@ -16,10 +16,12 @@ import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
+import reference_pages
 from measurements import KEPT, MEASUREMENTS, TABLES
 
 ROOT = Path(__file__).resolve().parent.parent
-_PLACE = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+WRITTEN = TABLES | {"effect_parameters": reference_pages.parameters}
+_PLACE = re.compile(r"(<!-- (?:measured|written): (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def write_pages(*, check: bool = False) -> list[str]:
@@ -27,7 +29,7 @@ def write_pages(*, check: bool = False) -> list[str]:
     stale = []
     for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
         text = path.read_text(encoding="utf-8")
-        new = _PLACE.sub(lambda place: place[1] + TABLES[place[2]]() + place[3], text)
+        new = _PLACE.sub(lambda place: place[1] + WRITTEN[place[2]]() + place[3], text)
         if new != text:
             stale.append(path.name)
             if not check:

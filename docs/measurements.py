@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,14 +41,20 @@ def kept(name: str) -> dict[str, Any]:
 def table(name: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A table in Markdown, and below it where its numbers come from."""
     lines = [list(head), ["---"] * len(list(head)), *([str(cell) for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin(name)}</small>\n"
+
+
+def origin(name: str) -> str:
+    """The command of a kept measurement, and when and where it was made."""
     file = kept(name)
-    origin = f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n<small>{origin}</small>\n"
+    return f"`{file['command']}`, {file['date']}, commit `{file['commit']}`, {file['machine']}"
 
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number as people read it."""
-    return "not known" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "not known"
+    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
 def _verify(found: dict[str, Any]) -> Any:
@@ -249,6 +256,24 @@ def _study_reference() -> str:
     return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
 
 
+def _fronts(found: dict[str, Any]) -> Any:
+    """A study of all solvers, with the errors and costs that are drawn."""
+    case = found["cases"][0]
+    errors, costs = (_SURFACE, "fibre_length.rms_percent"), ("seconds_per_frame", _TIME, "unknowns", fronts.LOAD)
+    points = [
+        one | {"errors": _only(one["errors"], errors), "costs": _only(one["costs"], costs)} for one in case["points"]
+    ]
+    drawn = {"points": points, "claims": [one for one in case["claims"] if one["metric"] == "surface_deviation"]}
+    names = (field.name for field in fields(cost_study.CaseStudy))
+    return (
+        {name: case[name] for name in names} | drawn | {name: _only(case[name], errors) for name in ("units", "bars")}
+    )
+
+
+def _only(found: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    return {name: found[name] for name in names if name in found}
+
+
 def _stress(found: dict[str, Any]) -> Any:
     counts = [
         {"solver": name} | Counter(one["verdict"] for one in found["cells"] if one["solver"] == name)
@@ -287,28 +312,29 @@ def _solvers(found: dict[str, Any]) -> Any:
     for one in found["results"]:
         worst = {name: one["worst"][name]["value"] for name in kept if one["worst"].get(name)}
         head = {key: one[key] for key in ("kind", "name", "case", "status")}
-        rows.append(head | {"needs": sum(one["needs"].values()), "worst": worst})
+        counted = {"needs": sum(one["needs"].values()), _TIME: one[_TIME]}
+        rows.append(head | counted | {"worst": worst})
     return rows
 
 
 def _solvers_on_muscles(name: str, head: str) -> str:
-    """A table of one statistic in the worst frame: solvers of each kind, by muscle; of the reference its error bars."""
+    """A table of a time, or of one statistic in the worst frame, by solver and muscle; of the reference its error bars."""
     measured = kept("table_5_1")["measured"]
     cases = list(dict.fromkeys(one["case"] for one in measured))
     rows = []
     for kind, solver in dict.fromkeys((one["kind"], one["name"]) for one in measured):
         found = {one["case"]: one for one in measured if (one["kind"], one["name"]) == (kind, solver)}
         cells = [_cell(found.get(case), name) for case in cases]
-        rows.append((kind, f"`{solver}`" + (", error bar" if solver == "reference" else ""), *cells))
+        rows.append((kind, f"`{solver}`" + (", error bar" if solver == "reference" and name != _TIME else ""), *cells))
     return table("table_5_1", ("", head, *(f"`{case}`" for case in cases)), rows)
 
 
 def _cell(one: dict[str, Any] | None, name: str) -> str:
     if one is None:
-        return "not measured"
+        return "not recorded"  # frames of the report's own program
     if one["status"] != "converged":
         return one["status"]
-    value = one["worst"].get(name)
+    value = one[name] if name in one else one["worst"].get(name)
     return "not applicable" if value is None else number(abs(value) if one["kind"] == "FEM" else value, 2)
 
 
@@ -317,6 +343,11 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
+    "fronts": Measurement(
+        "./fem study hip_flexion --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --solver fenicsx "
+        "--solver xpbd --solver pbd --solver arap --solver arap_pbd --solver mass_spring --solver viper",
+        _fronts,
+    ),
     "stress": Measurement("./fem stress --steps", _stress),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "credibility": Measurement("./fem page credibility", _credibility),
@@ -342,4 +373,5 @@ TABLES = {
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
+    "solvers_time": partial(_solvers_on_muscles, _TIME, "processor time, s"),
 }

@@ -6,12 +6,15 @@
 import argparse
 import base64
 import inspect
+import json
 import re
 from collections.abc import Callable, Iterator
+from html import escape
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
+import example_pictures
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic_core import PydanticUndefined
 
@@ -85,6 +88,12 @@ def laws() -> str:
     return _sections(effect_records())
 
 
+def parameters() -> str:
+    """The parameters of every effect, in one table; the region of an effect is said beside it."""
+    rows = [f"| `{name}` | {'; '.join(map(_parameter, keys.items()))} |\n" for name, keys in _parameters().items()]
+    return "| effect | parameters |\n|---|---|\n" + "".join(rows)
+
+
 def ranges() -> str:
     """The ranges of parameters of effects in the literature."""
     rows = [
@@ -117,6 +126,16 @@ def examples() -> str:
     return "\n".join(_script(path.relative_to(EXAMPLES).as_posix()) for path in scripts)
 
 
+def cards() -> str:
+    """The examples with pictures, each a link to its source."""
+    return f'```{{raw}} html\n<div class="cards">\n{"".join(map(_card, example_pictures.sources()))}</div>\n```\n'
+
+
+def notebooks() -> str:
+    """The notebooks, whole: their text and their code."""
+    return "\n".join(map(_notebook, sorted(EXAMPLES.glob("*.ipynb"))))
+
+
 GENERATED: dict[str, Callable[[], str]] = {
     "scenes": scenes,
     "files": files,
@@ -127,11 +146,44 @@ GENERATED: dict[str, Callable[[], str]] = {
     "api": api,
     "gallery": gallery,
     "examples": examples,
+    "cards": cards,
+    "notebooks": notebooks,
 }
+
+
+def _parameters() -> dict[str, dict[str, Any]]:
+    found = {name: _fields(records[0]) for name, records in effect_records().items()}
+    return {name: {key: field for key, field in fields.items() if key != "in"} for name, fields in found.items()}
+
+
+def _parameter(named: tuple[str, Any]) -> str:
+    """A key with its value, and its unit alone where it is a quantity."""
+    key, field = named
+    value = _value(field.annotation, field.metadata)
+    for long, short in (("three quantities, kept in", "three, in"), ("quantity, kept in ", ""), (" (", " "), (")", "")):
+        value = value.replace(long, short)
+    return f"`{key}` ({_cell(value)}{'' if field.is_required() else ', optional'})"
 
 
 def _script(name: str) -> str:
     return f"## {name}\n\n```{{literalinclude}} ../examples/{name}\n:language: python\n```\n"
+
+
+def _card(name: str) -> str:
+    return (
+        f'<a href="#{re.sub("[^a-z]+", "-", name)}"><img src="_static/examples/{example_pictures.picture(name).name}" alt="">'
+        f"<b>{escape(example_pictures.title(name))}</b><code>{name}</code></a>\n"
+    )
+
+
+def _notebook(path: Path) -> str:
+    """The cells of a notebook below a heading with its file; its own heading is a line."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+    shown = [f"```python\n{text}\n```" if kind == "code" else text for kind, text in texts]
+    shown[0] = re.sub("^# (.*)", r"**\1**", shown[0])
+    shown.append(f"![The last figure](_static/examples/{example_pictures.picture(path.name).name})")
+    return "\n\n".join([f"## {path.name}", *shown]) + "\n"
 
 
 def _automatic(name: str) -> str:

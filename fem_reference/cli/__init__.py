@@ -11,6 +11,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from fem_reference.cli._explained import page_of
 from fem_reference.cli._parser import parser
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
@@ -40,6 +41,7 @@ def main(arguments: list[str]) -> int:
         status: int = options.verb(options)
     except (InputError, OSError, MissingSoftware) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
+        _explain(str(error).partition("\n")[0])
         return SOLVER_FAILED if isinstance(error, MissingSoftware) else BAD_INPUT
     except KeyboardInterrupt:
         said = "interrupted; what is stored stays, and a run of the reference goes on next time"
@@ -51,6 +53,12 @@ def main(arguments: list[str]) -> int:
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
     return status
+
+
+def _explain(message: str) -> None:
+    """Name the page of the documentation that explains a message."""
+    if found := page_of(message):
+        print(f"see {found}", file=sys.stderr)
 
 
 def _why_broken(error: BaseException) -> str:
@@ -114,6 +122,8 @@ def out(options: argparse.Namespace) -> Path:
 def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
     """Print ``text``, and write ``facts`` as JSON where that is wanted."""
     print(text)
+    if not options.quiet:
+        _explain(text)
     if options.json is not None:
         write(options.json, json.dumps(facts, indent=1, allow_nan=False))
 

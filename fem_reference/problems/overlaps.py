@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings, overlaps
+from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
@@ -15,10 +16,16 @@ _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # a facet with four corners in two tr
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least: the greatest of a corner of either below the
-    skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what they bulge.
+    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least."""
+    points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
+    return overlap_at(body.mesh, law, points)
+
+
+def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
+    """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm], at least: the greatest of a
+    corner of either below the skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what
+    they bulge.
     """
-    mesh, points = body.mesh, body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
     piece = _pieces(mesh)
@@ -32,6 +39,12 @@ def overlap(body: Body, law: Touching) -> float:
         crossed = (points[part.triangles[some]] for part, some in zip(parts, pairs.T, strict=True))
         depths.append(overlaps(*crossed).max())
     return float(max(depths)) - _bulge(mesh, points, np.concatenate([one, other]))
+
+
+def longest_edge(mesh: Cells, law: Touching) -> float:
+    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are a quarter of it apart, at most."""
+    corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
+    return max(float(edge_lengths(one).max()) for one in corners)
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:

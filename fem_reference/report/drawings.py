@@ -172,11 +172,14 @@ def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
 
 
 def plain_numbers(axis: Any) -> None:
-    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones only where hardly a major one is seen."""
+    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones only where hardly a major one is seen, and
+    there only 2 and 5 of each decade where more would overlap.
+    """
 
     def minor(value: float, _: int | None) -> str:
         low, high = axis.get_view_interval()
-        return number(value) if sum(low <= one <= high for one in axis.get_majorticklocs()) < 2 else ""
+        few = sum(low <= one <= high for one in axis.get_majorticklocs()) < 2
+        return number(value) if few and (high < 4 * low or f"{value:e}"[0] in "25") else ""
 
     axis.set_major_formatter(lambda value, _: number(value))
     axis.set_minor_formatter(FuncFormatter(minor))

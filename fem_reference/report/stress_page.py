@@ -33,7 +33,8 @@ def summary(found: Stress) -> str:
     """The number of cells of each verdict, in words."""
     counts = [sum(cell.verdict == verdict for cell in found.cells) for verdict in VERDICTS]
     parts = ", ".join(f"{count} {verdict}" for count, verdict in zip(counts, VERDICTS, strict=True))
-    return f"{len(found.cases)} hard cases by {len(found.solvers)} solvers: {parts}"
+    solvers = found.solvers[0] if len(found.solvers) == 1 else f"{len(found.solvers)} solvers"
+    return f"{len(found.cases)} hard cases by {solvers}: {parts}"
 
 
 def text(found: Stress) -> str:

@@ -7,11 +7,14 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 from typing import get_args
 
+import drawn_results
 import pages
 import pytest
 import reference_pages
+from browser import PROGRAM, Browser
 
 import fem_reference as fr
 from fem_reference import effects, metrics, solvers
@@ -126,12 +129,44 @@ def test_scenes_and_effects_can_be_read() -> None:
     assert casefile.cases()
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not importlib.util.find_spec("sphinx"), reason="Sphinx is not installed (extra docs)")
-def test_the_pages_build_without_a_warning_and_load_nothing_from_elsewhere(tmp_path) -> None:
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(tmp_path)]
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the pages, built once without a warning."""
+    if not all(map(importlib.util.find_spec, ("sphinx", "furo"))):
+        pytest.skip("Sphinx and furo are not installed (extra docs)")
+    folder = tmp_path_factory.mktemp("docs")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(folder)]
     done = subprocess.run(command, cwd=pages.ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    for path in tmp_path.glob("*.html"):
-        assert not re.search(r"(src|<link[^>]*href)=\"(https?:)?//", path.read_text(encoding="utf-8")), path.name
-    assert "compare" in (tmp_path / "api.html").read_text(encoding="utf-8")
+    return folder
+
+
+@pytest.mark.slow
+def test_the_pages_load_nothing_from_elsewhere_and_have_their_pictures(built: Path) -> None:
+    for path in built.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"(src|<link[^>]*href)=\"(https?:)?//", text), path.name
+        for source in re.findall(r'<img[^>]* src="(?!data:)([^"]+)"', text):
+            assert (built / source).is_file(), f"{path.name}: {source}"
+    assert "compare" in (built / "api.html").read_text(encoding="utf-8")
+    drawn = {name for page in pages.PAGES for name in re.findall(r"<!-- drawn: (\w+) -->", pages.page(page))}
+    assert drawn == set(drawn_results.DRAWN)
+    front = (built / "index.html").read_text(encoding="utf-8")
+    assert front.count("<svg viewBox") == 3
+    assert "--c-0072b2: #4aa3f0" in front  # pbd on dark paper, as on the pages of results
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(PROGRAM is None, reason="chromium is not installed: apt-get install chromium")
+def test_no_table_is_cut_without_a_sign_on_a_phone(built: Path, tmp_path: Path) -> None:
+    with Browser(tmp_path) as browser:
+        for name in ("scene_keys", "fast_solvers", "cost"):
+            browser.screen(390, scheme="dark")
+            browser.open(built / f"{name}.html")
+            browser.wait("document.readyState === 'complete'")
+            assert browser.ask("document.documentElement.scrollWidth") <= 390, name
+            cut = "[...document.querySelectorAll('.table-wrapper')].filter(it => it.scrollWidth > it.clientWidth + 1)"
+            assert browser.ask(
+                f"{cut}.every(it => getComputedStyle(it, '::before').content.includes('scroll for more'))"
+            )
+        assert browser.ask(f"{cut}.length") > 0  # the last page has such a table

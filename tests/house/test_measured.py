@@ -1,7 +1,9 @@
 """Tables of measurements on the pages: they are those of the files that are kept, and each file says where it is from."""
 
+import json
 import re
 
+import example_pictures
 import measured
 import measurements
 import pages
@@ -13,8 +15,8 @@ def test_the_pages_have_the_tables_that_are_kept() -> None:
 
 
 def test_every_table_has_its_place() -> None:
-    places = re.findall(r"<!-- measured: (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
-    assert set(places) == set(measurements.TABLES)
+    places = re.findall(r"<!-- (?:measured|written): (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
+    assert set(places) == set(measured.WRITTEN)
 
 
 @pytest.mark.parametrize("name", measurements.MEASUREMENTS)
@@ -53,3 +55,11 @@ def test_every_solver_has_as_many_hard_cases() -> None:
     found = measurements.kept("stress")["measured"]
     assert len({sum(count for count in one.values() if isinstance(count, int)) for one in found["counts"]}) == 1
     assert len(found["ends"]) > 20
+
+
+def test_every_picture_is_that_of_its_example() -> None:
+    """Python docs/example_pictures.py makes them anew."""
+    assert json.loads(example_pictures.FILE.read_text(encoding="utf-8")) == example_pictures.sources()
+    drawn = {path.name: path.stat().st_size for path in example_pictures.KEPT.glob("*.webp")}
+    assert set(drawn) == {example_pictures.picture(name).name for name in example_pictures.sources()}
+    assert max(drawn.values()) < 30_000

@@ -119,7 +119,9 @@ def test_a_picture_is_what_stands_in_a_source() -> None:
 
 
 def test_a_logarithmic_axis_within_a_decade_has_numbers_and_a_longer_one_only_its_powers() -> None:
-    """Between 0.37 and 0.68 no power of ten stands; between 1 and 1000 four do."""
+    """Between 0.37 and 0.68 no power of ten stands; between 0.15 and 5.5 one does, and other numbers than 2 and 5 would overlap;
+    between 1 and 1000 four do.
+    """
 
     def labels(low: float, high: float) -> list[str]:
         axes = Figure().subplots()
@@ -130,4 +132,5 @@ def test_a_logarithmic_axis_within_a_decade_has_numbers_and_a_longer_one_only_it
         return [text.get_text() for at, text in shown if low <= at <= high and text.get_text()]
 
     assert labels(0.37, 0.68) == ["0.400", "0.500", "0.600"]
+    assert labels(0.15, 5.5) == ["0.200", "0.500", "2", "5"]
     assert labels(1, 1000) == []

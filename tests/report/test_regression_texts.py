@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from balls import REFERENCE, SHIFTS, bars, checked, current, edited
+from balls import NUMBERS, REFERENCE, SHIFTS, bars, checked, current, edited
 
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.regression import Check, Judgement
@@ -46,6 +46,28 @@ def test_junit_has_a_case_for_each_judgement(mixed) -> None:
     (moved,) = (case for case in cases if case.get("name") == "positions.moved unchanged")
     assert moved.find("failure").get("message") == "frame 20: 3 mm from what it was, 0.1 mm allowed"
     assert suite.find("system-out") is None
+
+
+@pytest.mark.parametrize(("shifts", "frame"), [((9, 8), "10"), ((8, 14), "20")])
+def test_the_error_bar_beside_a_row_is_that_of_its_statistic_in_its_frame(path, shifts, frame) -> None:
+    """No two bars are alike: they grow by statistic, and are three times as long in the last frame."""
+    spread = [replace(one, values=1e-3 * (i + 1) * np.array([0.0, 1, 3])) for i, one in enumerate(bars().bars)]
+    edited(path, lambda table: [one.update(within=0.01) for one in table["measures"].values() if "within" in one])
+    found = checked(
+        path, current([(0, 0, 0), (shifts[0], 0, 5), (shifts[1], 0, 10)], replace(bars(), bars=tuple(spread)))
+    )
+    own = {f"{one.metric}.{one.statistic}": (one.unit, dict(zip(NUMBERS, one.values, strict=True))) for one in spread}
+    rows = [
+        line.strip("| ").split(" | ") for line in regression_texts.markdown(found).splitlines() if " within | " in line
+    ]
+    texts = [one.text for one in ElementTree.fromstring(regression_texts.junit(found, 1)).iter("failure")]
+    named = [dict(line.split(": ", 1) for line in text.splitlines()) for text in texts]
+    rows += [list(one.values()) for one in named if one["question"] == "within"]
+    assert frame in {row[3] for row in rows}
+    assert len(rows) >= 14  # seven statistics of the surface, in both texts
+    for _, _, name, at, *_, bar in rows:
+        unit, values = own[name]
+        assert bar == f"{values[int(at)]:.4g} {unit}", name
 
 
 def test_notes_are_in_every_text(mixed) -> None:

@@ -267,3 +267,12 @@ def test_of_several_cases_each_answers_in_its_own_section() -> None:
     shown = study_page.page(Study((study(), study("knee")))).html()
     assert "<li>Within" not in shown[: shown.index("</header>")]
     assert shown.count("<li>Within 5 mm: ") == 2
+
+
+def test_a_solver_that_meets_no_request_has_a_row_too() -> None:
+    """One setting, 9 mm and 10 s a frame: not within 5 mm, not at 60 frames a second, and no knee."""
+    known = own_study(features(50))
+    lost = Point("bar", "lost", "lost", "", "", {"solver": "lost"}, "converged", "", {RMS: 9.0}, {TIME: 10.0})
+    text = study_page.page(Study((replace(known, points=(*known.points, lost)),))).html()
+    row = text[text.index("<tr><th>lost</th>") :].partition("</tr>")[0]
+    assert re.findall(r"<td>(.*?)</td>", row) == ["\N{EN DASH}"] * 4

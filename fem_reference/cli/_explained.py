@@ -1,0 +1,24 @@
+"""Pages of the documentation that explain messages: the few that a reader of such a message would want."""
+
+# What stands in a message, and the page beside it; the first that fits. Without one a message says all that there is.
+PAGES = (
+    ("FEniCSx is not installed", "getting_started.md"),
+    ("--solver-command", "your_own_solver.md#your-solver-as-a-command"),
+    ("--candidate", "your_own_solver.md"),
+    ("candidate.toml", "your_own_solver.md"),
+    (".toml: effect", "effects.md"),
+    (".toml: region", "effects.md#regions"),
+    (".toml: ", "scene_keys.md"),
+    ("verdict: doubtful pass", "measures.md#verdicts"),
+    ("verdict: inconclusive", "error_bars.md"),
+    (": denied, ", "verification.md#the-second-check"),
+)
+
+
+def page_of(message: str) -> str:
+    """The page that explains a ``message``, as a path in the checkout with a heading, else empty.
+
+    >>> page_of('case.toml: effect[0].mu: got "1 mm", want a pressure')
+    'docs/effects.md'
+    """
+    return next((f"docs/{name}" for words, name in PAGES if words in message), "")
