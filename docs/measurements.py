@@ -52,7 +52,9 @@ def origin(name: str) -> str:
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number as people read it."""
-    return "not known" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "not known"
+    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
 def _verify(found: dict[str, Any]) -> Any:
@@ -310,28 +312,29 @@ def _solvers(found: dict[str, Any]) -> Any:
     for one in found["results"]:
         worst = {name: one["worst"][name]["value"] for name in kept if one["worst"].get(name)}
         head = {key: one[key] for key in ("kind", "name", "case", "status")}
-        rows.append(head | {"needs": sum(one["needs"].values()), "worst": worst})
+        counted = {"needs": sum(one["needs"].values()), _TIME: one[_TIME]}
+        rows.append(head | counted | {"worst": worst})
     return rows
 
 
 def _solvers_on_muscles(name: str, head: str) -> str:
-    """A table of one statistic in the worst frame: solvers of each kind, by muscle; of the reference its error bars."""
+    """A table of a time, or of one statistic in the worst frame, by solver and muscle; of the reference its error bars."""
     measured = kept("table_5_1")["measured"]
     cases = list(dict.fromkeys(one["case"] for one in measured))
     rows = []
     for kind, solver in dict.fromkeys((one["kind"], one["name"]) for one in measured):
         found = {one["case"]: one for one in measured if (one["kind"], one["name"]) == (kind, solver)}
         cells = [_cell(found.get(case), name) for case in cases]
-        rows.append((kind, f"`{solver}`" + (", error bar" if solver == "reference" else ""), *cells))
+        rows.append((kind, f"`{solver}`" + (", error bar" if solver == "reference" and name != _TIME else ""), *cells))
     return table("table_5_1", ("", head, *(f"`{case}`" for case in cases)), rows)
 
 
 def _cell(one: dict[str, Any] | None, name: str) -> str:
     if one is None:
-        return "not measured"
+        return "not recorded"  # frames of the report's own program
     if one["status"] != "converged":
         return one["status"]
-    value = one["worst"].get(name)
+    value = one[name] if name in one else one["worst"].get(name)
     return "not applicable" if value is None else number(abs(value) if one["kind"] == "FEM" else value, 2)
 
 
@@ -370,4 +373,5 @@ TABLES = {
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
+    "solvers_time": partial(_solvers_on_muscles, _TIME, "processor time, s"),
 }

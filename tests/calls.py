@@ -9,6 +9,7 @@ from typing import Any
 import calls_bodies
 import calls_forces
 import calls_lines
+import calls_muscles
 import calls_paths
 import damage
 import numpy as np
@@ -147,6 +148,7 @@ KINDS: dict[str, Callable[[World], st.SearchStrategy[Callable[[], Any]]]] = {
     "calls that make": making,
     "calls with cases and runs": working,
     "calls that solve": lambda _: calls_bodies.solving(),
+    "muscles": lambda _: calls_muscles.pressing(),
     "settings of lines": lambda _: calls_lines.settings_of_lines(),
     "lines": lambda _: calls_lines.line_calls(),
     "paths": lambda _: calls_paths.path_calls(),

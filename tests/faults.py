@@ -1,10 +1,13 @@
 """Faults of one line, planted one after the other in a copy of the project: each must turn one of the tests named red.
 
 ``python tests/faults.py [NAME ...]`` (all without names) prints a line for each; exit status 1 where one is not noticed.
-With ``--places`` it plants none and says in a second which of them have lost their place.
+With ``--places`` it plants none and says in a second which of them have lost their place. ``faults.json`` keeps what came of each,
+when and at which commit; with ``--stale`` only those are planted whose row, file or tests are not what they were then.
 """
 
 import argparse
+import hashlib
+import json
 import os
 import re
 import shutil
@@ -14,13 +17,14 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fem_reference.foundations.subprocesses import command
 
 ROOT = Path(__file__).resolve().parent.parent
-LIST = Path(__file__).with_suffix(".toml")
+LIST, RECORD = (Path(__file__).with_suffix(end) for end in (".toml", ".json"))
 
 
 class Fault(NamedTuple):
@@ -51,6 +55,33 @@ def misplaced(fault: Fault) -> list[str]:
     places = [] if found == 1 else [f"{fault.name} ({fault.file}): {fault.old!r} is there {found} times"]
     names = [name for name in fault.tests.split() if not (ROOT / "tests" / f"{name}.py").is_file()]
     return [*places, *(f"{fault.name}: no file tests/{name}.py" for name in names)]
+
+
+def fingerprint(root: Path, fault: Fault) -> str:
+    """A hash of a fault and of the texts of its file and tests below ``root``, 16 hex digits."""
+    files = [place(root, fault), *(root / "tests" / f"{name}.py" for name in fault.tests.split())]
+    return hashlib.sha256(b"".join([repr(fault).encode(), *(one.read_bytes() for one in files)])).hexdigest()[:16]
+
+
+def key(fault: Fault) -> str:
+    """What a fault is called in the record and in what is printed."""
+    return f"{fault.name} ({fault.file})"
+
+
+def recorded() -> dict[str, dict[str, Any]]:
+    """What came of faults, by name and file."""
+    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {}
+
+
+def record(fault: Fault, text: str, *, red: bool) -> None:
+    """Keep what came of a fault with the fingerprint ``text``."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    now = {"red": red, "date": f"{datetime.now(UTC):%Y-%m-%d}", "commit": commit.stdout.strip(), "text": text}
+    rows = sorted((recorded() | {key(fault): now}).items())
+    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(row)}" for name, row in rows)
+    RECORD.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
 
 
 def plant(fault: Fault, copy: Path) -> tuple[bool, str]:
@@ -85,6 +116,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="a part of a name or of a file (default: all faults)")
     parser.add_argument("--places", action="store_true", help="plant none: look only for the places of the faults")
+    parser.add_argument("--stale", action="store_true", help="only faults that were not planted in the texts of now")
     given = parser.parse_args()
     names = given.names
     chosen = [one for one in FAULTS if not names or any(name in one.name or name in one.file for name in names)]
@@ -94,17 +126,20 @@ def main() -> int:
     sys.stdout.writelines(f"LOST  {sentence}\n" for sentence in lost)
     if lost or given.places:
         return 1 if lost else 0
+    if given.stale:
+        chosen = [one for one in chosen if recorded().get(key(one), {}).get("text") != fingerprint(ROOT, one)]
     missed = 0
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         copy = Path(folder) / "copy"
         ignored = shutil.ignore_patterns(".git", ".venv", "__pycache__", "reports")
         shutil.copytree(ROOT, copy, ignore=ignored)
         for fault in chosen:
-            begin = time.perf_counter()
+            begin, text = time.perf_counter(), fingerprint(copy, fault)
             red, said = plant(fault, copy)
+            record(fault, text, red=red)
             missed += not red
             taken = time.perf_counter() - begin
-            sys.stdout.write(f"{'red' if red else 'GREEN':5} {fault.name} ({fault.file}): {said}, {taken:.0f} s\n")
+            sys.stdout.write(f"{'red' if red else 'GREEN':5} {key(fault)}: {said}, {taken:.0f} s\n")
             sys.stdout.flush()
     sys.stdout.write(f"{len(chosen)} faults, {missed} not noticed\n")
     return 1 if missed else 0

@@ -15,7 +15,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -190,6 +190,12 @@ def _copied(source: Path, target: Path) -> Path:
     return target
 
 
+def shares(name: str, names: Sequence[str]) -> int:
+    """The number of equal shares of all inputs, of which a kind gets one: calls from Python are half of them, files the other."""
+    alike = [one for one in names if (one in calls.KINDS) is (name in calls.KINDS)]
+    return len(names) if len(alike) == len(names) else 2 * len(alike)
+
+
 def main() -> int:
     """Try every kind, or those named; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -201,7 +207,7 @@ def main() -> int:
     names = options.kinds or KINDS
     failed, total = [], 0
     for name in names:
-        count = -(-options.inputs // len(names))
+        count = -(-options.inputs // shares(name, names))
         tried = (
             fuzz(name, count, options.seed, options.kept)
             if name in hostile.KINDS

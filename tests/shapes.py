@@ -78,6 +78,15 @@ def _subdivide(points: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarra
     return np.vstack([points, middles]), np.concatenate([np.column_stack(part) for part in parts])
 
 
+def renumbered(mesh: TetMesh, seed: int) -> TetMesh:
+    """The same mesh with its points, tetrahedra and facets in another order."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(mesh.points))
+    number = np.argsort(order)
+    facets = {name: number[rng.permutation(facet)] for name, facet in mesh.facets.items()}
+    return TetMesh(mesh.points[order], number[rng.permutation(mesh.tets)], facets)
+
+
 def bar(
     cells: tuple[int, int, int],
     size: tuple[float, float, float],

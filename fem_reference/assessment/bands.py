@@ -1,4 +1,7 @@
-"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs."""
+"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs.
+
+The surrogate is a sparse polynomial, or, where that misses too much, a Gaussian process, if it misses less.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
-from fem_reference.assessment import chaos
+from fem_reference.assessment import chaos, gaussian_process
 from fem_reference.assessment.chaos import Chaos
+from fem_reference.assessment.gaussian_process import Process
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
@@ -54,9 +58,11 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
     refused = design.refused or _not_numbers(known)
     if refused:
         return replace(band, refused=refused)
-    surrogate = chaos.fit(design.points, known)
+    surrogate: Chaos | Process | None = chaos.fit(design.points, known)
     if surrogate is None:
         return _filled(replace(band, by="runs"), defined, np.repeat(known[:1], 3, axis=0))
+    if surrogate.error > WORST:
+        surrogate = min(surrogate, gaussian_process.fit(design.points, known), key=lambda one: one.error)
     return _banded(band, design, surrogate, defined, known, surrogate(_samples(design)))
 
 
@@ -81,7 +87,9 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
     return _banded(band, design, surrogate, every, runs, np.sqrt(np.maximum(squares, 0.0)))
 
 
-def _banded(band: Band, design: Design, surrogate: Chaos, defined: Floats, runs: Floats, predicted: Floats) -> Band:
+def _banded(
+    band: Band, design: Design, surrogate: Chaos | Process, defined: Floats, runs: Floats, predicted: Floats
+) -> Band:
     """The ``band`` by what a surrogate ``predicted`` (s, f), or where that is too bad by the ``runs`` (n, f) themselves."""
     band = replace(band, error=surrogate.error)
     if surrogate.error <= WORST:

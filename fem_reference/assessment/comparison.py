@@ -122,19 +122,8 @@ class Comparison:
 def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs of a case.
-
-    Parameters
-    ----------
-    case, setup
-        The case, and the set-up of its problem.
-    reference
-        The run that serves as the truth.
-    candidates
-        Runs with all frames of the case, NaN where one was not reached. Only the parts that a run carries are judged.
-    error_bars
-        Those of the reference, where known: where they are too wide, nothing is judged.
-
+    """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
+    ``candidates`` have all frames of the case, NaN where one was not reached; where ``error_bars`` are too wide, nothing is judged.
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))

@@ -1,6 +1,5 @@
-"""Checks of the states that a solver calls converged, from its recorded positions and forces, independent of its loop.
-
-Every frame is checked. A check has its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
+"""Checks of all states that a solver calls converged, from its recorded positions and forces, independent of its loop. A check has
+its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
 """
 
 import math
@@ -14,7 +13,7 @@ import numpy as np
 from fem_reference.effects import in_situ
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.distance import distances
+from fem_reference.geometry.distance import distances, flattened
 from fem_reference.geometry.intersections import overlaps, self_crossings
 from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
@@ -23,6 +22,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.overlaps import longest_edge, overlap_at
 from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors
 from fem_reference.runs.store import Run
@@ -78,12 +78,12 @@ Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """Check that all states exist and are finite, and that exactly prescribed displacements are met at their nodes."""
+    """Check that states exist and are finite, are where prescribed exactly, and that parts that may touch do not cross."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
-    return (*found, *_worst(_prescribed(body, solved)))
+    return (*found, *_worst(chain(_prescribed(body, solved), _overlaps(body, solved))))
 
 
 def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
@@ -98,6 +98,16 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 # Up to this, regions may contradict each other where they meet.
                 allowed = SAME * (body.size + float(np.abs(wanted).max()))
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
+
+
+def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
+    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, and what is between contact points."""
+    for law in body.touching:
+        apart = longest_edge(body.mesh, law) / 4
+        for state in solved.states:
+            given = law.smoothing + state.scalars.get("touching_pressure", 0.0) / law.stiffness + _BETWEEN * apart
+            depth = overlap_at(body.mesh, law, state.points)
+            yield RunCheck(f"{law.one} in {law.other}", depth, given, "mm", state.number)
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
@@ -185,7 +195,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _travel(bone: Bone, before: float, after: float) -> float:
-    """Travel of a bone between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
+    """Travel of a bone between two frames, there and back counted twice [rad, or mm]."""
     motion = bone.motion
     assert motion is not None  # called for moving bones only
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
@@ -225,7 +235,8 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
-        alike = (one for earlier, one in seen if np.allclose(poses, earlier, 0, near))
+        posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few are all compared
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
@@ -255,7 +266,7 @@ def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, 
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
         deepest, place = found.deepest(_at_rest(rest, bone))
-        give += _behind(muscle, place) / half if pressed else 0.0
+        give += flattened(muscle, place) / half if pressed else 0.0
     allowed = min(give, _GIVEN_WAY * half)
     return _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
 
@@ -272,14 +283,6 @@ def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> 
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * apart
-
-
-def _behind(surface: Surface, place: Floats) -> float:
-    """The distance of the middle of the flat triangle at a ``place`` from a sphere through its corners, times its radius [mm2]:
-    between vertices a muscle is curved where a bone presses.
-    """
-    corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
-    return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
 
 
 def _creases(run: Run) -> Iterator[RunCheck]:

@@ -20,7 +20,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import COMMAND, HOME, Candidate, Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import judging
+from fem_reference.studies import judging, refinement
 from fem_reference.studies.execution import Bench
 
 
@@ -156,10 +156,17 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
     print(*written(asked, page, out(options), options.page_name)[1], sep="\n")
 
 
+def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Comparison:
+    """The runs of a case, measured and judged with the error bars that are asked for or cheap."""
+    reference, *runs = bench.runs(chosen)
+    bars = refinement.offered(bench, reference, asked=options.error_bar)
+    return judging.compare(bench, reference, runs, bars)
+
+
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
     with fenicsx.shared():
-        result = judging.judged(checked_bench(case, options, chosen), chosen, error_bars=options.error_bar)
+        result = judged(checked_bench(case, options, chosen), options, chosen)
     alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     wanted = asked("run" if alone else "compare", case, options, "report", *who)

@@ -14,6 +14,7 @@ from fem_reference.cli._cases import (
     check_names,
     checked_bench,
     command_parts,
+    judged,
     muscle_case,
     own_candidates,
     own_solver,
@@ -30,7 +31,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import cube_fits, estimation, judging, moment_arms, table_5_1, true_errors
+from fem_reference.studies import cube_fits, estimation, moment_arms, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
 from fem_reference.verification import experiments, runner
 
@@ -73,7 +74,7 @@ def _examples(options: argparse.Namespace) -> int:
     cases = [casefile.read(name) for name in OCTAVE]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
-        results = tuple(judging.judged(bench, own_candidates(bench.scene)) for bench in benches)
+        results = tuple(judged(bench, options, own_candidates(bench.scene)) for bench in benches)
     page = field_page.page("The report's Octave examples", results)
     path, lines = written(_asked([], options), page, out(options), options.page_name)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}

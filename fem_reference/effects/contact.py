@@ -1,4 +1,4 @@
-"""Frictionless contact of bones with the muscle, with any sliding; attached parts and parts near to them are exempt."""
+"""Contact of bones with the muscle, with any sliding; attached parts and parts near to them are exempt."""
 
 import math
 from collections.abc import Iterable
@@ -17,7 +17,8 @@ class Contact(Interaction):
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
     distance below which a bone is felt. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
     distance within which a bone may press at rest, through what lies between and is in no mesh, as a capsule or a bursa; by
-    default it does where the muscle touches it.
+    default it does where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact
+    is frictionless.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}
@@ -25,6 +26,7 @@ class Contact(Interaction):
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
     support: PositiveLength | None = None
+    friction: float | None = Field(default=None, gt=0)
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The possible penetration of the surface into bones, and the pressure there."""

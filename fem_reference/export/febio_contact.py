@@ -48,11 +48,11 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
     for attached in febio_mesh.by_springs(problem):
         settings = {"penalty": penalty(problem, attached), "search_radius": SPRING_SEARCH_RADIUS}
         _pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
-    deep = overlaps(problem)
+    deep, friction = overlaps(problem), (problem.contact.friction or 0.0) if problem.contact else 0.0
     for bone in problem.obstacles:
         assert problem.contact is not None  # or there is no contact
         radius = search_radius(problem, deep[bone.name])
-        settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": 0.0}
+        settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": friction}
         _pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
 
 

@@ -80,6 +80,14 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
     return np.ravel(tree.winding_number(np.ascontiguousarray(points)) > 0.5)
 
 
+def flattened(surface: Surface, place: Floats) -> float:
+    """The distance of the middle of the flat triangle nearest to a ``place`` (3,) [mm] from a sphere through its corners, times the
+    sphere's radius [mm2]: what is curved between vertices is that far from its triangle.
+    """
+    corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
+    return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
     """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside

@@ -212,6 +212,11 @@ class Body:
         return self.frames[0] if relaxed is None else relaxed[1]
 
     @property
+    def rubs(self) -> bool:
+        """True with friction, where a state depends on the path to it."""
+        return self.contact is not None and self.contact.friction is not None
+
+    @property
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
         return diagonal(self.mesh.points)

@@ -12,7 +12,7 @@ from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import regions, tendons
+from fem_reference.problems import friction, regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -132,6 +132,7 @@ def _check_rest(body: Body) -> None:
             raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
     if body.contact is not None and not isinstance(body.contact, ContactLaw):
         raise InputError("contact", said(body.contact), "a ContactLaw, or None")
+    friction.check(body.contact and body.contact.friction, "contact.friction")
 
 
 def _check_cells(mesh: Any) -> None:

@@ -35,7 +35,7 @@ class ContactBone:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Frictionless contact of bones, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
+    """Contact of bones, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
     pressure depends on the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm],
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
     ``stiffness``: k [MPa/mm]; under pressure p a surface penetrates by p / k.
@@ -45,6 +45,9 @@ class ContactLaw:
 
     ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
     there, with the pressure that balances the tension (``effects.in_situ``); later a point feels the change of its gap.
+
+    ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
+    k, and slides under the friction times the pressure.
     """
 
     on: str | Skin
@@ -52,6 +55,7 @@ class ContactLaw:
     smoothing: float
     relaxed: tuple[float, float] | None = None
     in_situ: float | None = None
+    friction: float | None = None
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""

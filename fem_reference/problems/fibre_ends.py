@@ -1,12 +1,13 @@
-"""The ends of a muscle's fibres: the attachment that each belongs to, and its distance from that."""
+"""The ends of a muscle's fibres: the attachment that each belongs to, its distance from that, and the area that they cover."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, corner_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
@@ -22,7 +23,8 @@ Bools = NDArray[np.bool_]
 @dataclass(frozen=True, eq=False)
 class FibreEnds:
     """The first and the last end of k fibres: ``by`` (k, 2), the index of the attachment in ``attached`` that each belongs to, its
-    ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that.
+    ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that; ``covered`` (a,): the
+    share of the area of each attachment that is within the mean spacing of fibres, sqrt(area / k), of an end that belongs to it.
 
     An end that does not reach its attachment goes on by the tendon of that, where it has one.
     """
@@ -31,6 +33,7 @@ class FibreEnds:
     by: Ints
     distance: Floats
     closest: Floats
+    covered: Floats
 
     @cached_property
     def tendons(self) -> Floats:
@@ -51,11 +54,8 @@ class FibreEnds:
         return found
 
     def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
-        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from where bones take them from ``rest`` (k, 2, 3); 0
-        with a tendon, which ends at its bone.
-        """
-        away = np.linalg.norm(ends - self.taken(rest, frame), axis=2)
-        return np.where(np.isnan(self.tendons[:, :, 0]) | np.isnan(away), away, 0.0)
+        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from where bones take them from ``rest`` (k, 2, 3)."""
+        return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
         """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 without."""
@@ -64,20 +64,31 @@ class FibreEnds:
 
     def named(self, fibre: int, side: int) -> str:
         """An end in words."""
-        return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}"
+        tied = " by its tendon" if np.isfinite(self.tendons[fibre, side, 0]) else ""
+        return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}{tied}"
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The number of ends, of those that go on by a tendon, and of those beside their attachment; of these all by name."""
-        found: dict[str, float | str] = {"fibre_ends": float(self.by.size)}
-        found["fibre_ends_beside"] = float(self.beside.sum())
-        if np.isfinite(self.tendons).any():
-            found["fibre_ends_by_tendon"] = float(np.isfinite(self.tendons[:, :, 0]).sum())
+        """The number of ends, of those that go on by a tendon, and of those beside their attachment, all of both by name; the share
+        of each attachment that they cover [%].
+        """
+        tied = np.isfinite(self.tendons[:, :, 0])
+        found: dict[str, float | str] = {
+            "fibre_ends": float(self.by.size),
+            "fibre_ends_beside": float(self.beside.sum()),
+        }
+        for one, share in zip(self.attached, self.covered, strict=True):
+            found[f"{one.attachment}_covered_percent"] = 100 * float(share)
+        if tied.any():
+            found |= {"fibre_ends_by_tendon": float(tied.sum()), "fibre_ends_on_by_tendon": self._words(tied)}
         if self.beside.any():
             found["fibre_end_farthest_mm"] = float(self.distance[self.beside].max())
-            names = (f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in np.argwhere(self.beside).tolist())
-            found["fibre_ends_not_attached"] = "; ".join(names)
+            found["fibre_ends_not_attached"] = self._words(self.beside)
         return found
+
+    def _words(self, mask: Bools) -> str:
+        """The ends of a ``mask`` (k, 2), each with its distance from its attachment."""
+        return "; ".join(f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in np.argwhere(mask).tolist())
 
 
 def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:
@@ -106,7 +117,8 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
     pairs = np.argmin(sums.reshape(len(ends), -1), axis=1)
     by = np.stack(np.divmod(pairs, len(bones)), axis=1)
     fibre, side = np.indices(by.shape)
-    return FibreEnds(attached, by, away[fibre, side, by], closest[fibre, side, by])
+    covered = np.array([_covered(exempt.part[exempt.by == i], ends[by == i], len(ends)) for i in range(len(attached))])
+    return FibreEnds(attached, by, away[fibre, side, by], closest[fibre, side, by], covered)
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
@@ -126,6 +138,15 @@ def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
 def _steps(start: Floats, end: Floats) -> Floats:
     """Points (n, 3) [mm] evenly from ``start``, without it, to ``end``."""
     return np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / REACHES)) + 1)[1:]
+
+
+def _covered(part: Floats, ends: Floats, fibres: int) -> float:
+    """The area of the triangles ``part`` (r, 3, 3) within the mean spacing of so many ``fibres`` of ``ends`` (m, 3), as a share."""
+    areas = corner_areas(part)
+    if len(ends) == 0 or not areas.sum():
+        return 0.0
+    away, _ = cKDTree(ends).query(part.mean(axis=1))
+    return float(areas[away <= np.sqrt(areas.sum() / fibres)].sum() / areas.sum())
 
 
 def _nearest(exempt: Exemption, i: int, ends: Floats) -> Distances:

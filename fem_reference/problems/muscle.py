@@ -293,6 +293,6 @@ def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: Contac
     tense = in_situ.among(body.effects) is not None
     before = first - RELAXING if nearest < effect.smoothing and not tense else None
     relaxed, support = None if before is None else (before, first), effect.support or 0.0 if tense else None
-    law = ContactLaw(skin, effect.stiffness, effect.smoothing, relaxed, support)
+    law = ContactLaw(skin, effect.stiffness, effect.smoothing, relaxed, support, effect.friction)
     posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
     return replace(body, frames=(*(relaxed or (first,)), *body.frames[1:]), contact=law, bones=posed)

@@ -1,10 +1,14 @@
-"""Overlap of parts of the surface of a body that may touch, at the start: the search for contact sees only what is shallow."""
+"""Parts of the surface of a body that may touch: their overlap at the start, as the search for contact sees only what is shallow,
+and the skin beyond their rims.
+"""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings, overlaps
+from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
@@ -12,24 +16,56 @@ _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # a facet with four corners in two tr
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least: the greatest of a corner of either below the
-    skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what they bulge.
+    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least."""
+    points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
+    return overlap_at(body.mesh, law, points)
+
+
+def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
+    """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm], at least: the greatest of a
+    corner of either below the skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what
+    they bulge.
     """
-    mesh, points = body.mesh, body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
-    piece = connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(points))
-    depths, keys, parts = [0.0], np.sort(facets, axis=1).tolist(), list[Surface]()
+    piece = _pieces(mesh)
+    depths, parts = [0.0], list[Surface]()
     for part, against in ((one, other), (other, one)):
         skin = Surface(points, triangles[np.isin(piece[facets[:, 0]], piece[against])[owner]])
         corners = points[np.unique(part)]
         depths.append(distances(corners[inside(skin, corners)], skin).distance.max(initial=0.0))
-        own = set(map(tuple, np.sort(part, axis=1).tolist()))
-        parts.append(Surface(points, triangles[np.array([tuple(key) in own for key in keys])[owner]]))
+        parts.append(Surface(points, triangles[_among(facets, part)[owner]]))
     if len(pairs := crossings(*parts)):
         crossed = (points[part.triangles[some]] for part, some in zip(parts, pairs.T, strict=True))
         depths.append(overlaps(*crossed).max())
     return float(max(depths)) - _bulge(mesh, points, np.concatenate([one, other]))
+
+
+def longest_edge(mesh: Cells, law: Touching) -> float:
+    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are a quarter of it apart, at most."""
+    corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
+    return max(float(edge_lengths(one).max()) for one in corners)
+
+
+def beyond_rim(body: Body, side: str, other: str) -> Ints:
+    """The facets (f, 3 or 4) of the skin around the part ``other``, on its piece, that the part ``side`` may not touch."""
+    mesh, facets = body.mesh, outer_facets(body.mesh)[0]
+    laws = [(law.one, law.other) for law in body.touching]
+    named = [mesh.facets[two] for one, two in [*laws, *(law[::-1] for law in laws)] if one == side]
+    piece = _pieces(mesh)
+    beside = np.isin(piece[facets[:, 0]], piece[mesh.facets[other]])
+    return np.asarray(facets[beside & ~_among(facets, np.concatenate(named))])
+
+
+def _pieces(mesh: Cells) -> Ints:
+    """The number (n,) of the piece of each point."""
+    return connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(mesh.points))
+
+
+def _among(facets: Ints, part: Ints) -> NDArray[np.bool_]:
+    """True (f,) for those of the ``facets`` with the corners of one of ``part``, in any order."""
+    own = set(map(tuple, np.sort(part, axis=1).tolist()))
+    return np.array([tuple(key) in own for key in np.sort(facets, axis=1).tolist()], bool)
 
 
 def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:

@@ -43,6 +43,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     facts = _head(comparison.scene, reference, comparison.word) | {
         "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
+        "mesh": plain(reference.origin.get("mesh", {})),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in comparison.runs},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],

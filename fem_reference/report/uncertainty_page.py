@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.uncertainty import Band, Placed, Uncertainty, facts
-from fem_reference.report.drawings import BAND, REFERENCE, Drawing, drawn, looks, over_frames
+from fem_reference.report.drawings import REFERENCE, Drawing, drawn, looks, over_frames
 from fem_reference.report.pages import Page
 from fem_reference.report.words import listed, number
 
@@ -107,12 +107,13 @@ def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
     axes.fill_between(frames, low, high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
     axes.plot(frames, band.median - band.nominal, color=_SHADE, linewidth=1.2, label="median")
     if band.bar is not None:
-        axes.fill_between(frames, 0 if band.distance else -bar, bar, color=BAND, linewidth=0, label="error bar")
+        look = {"facecolor": "none", "edgecolor": _SHADE, "hatch": "/////", "linewidth": 0.8}
+        axes.fill_between(frames, 0 if band.distance else -bar, bar, label="error bar", **look)
     if not band.distance:
         axes.axhline(0, color=REFERENCE, linewidth=1.5, label="the case")
-    look = looks(one.candidate for one in found.placed)
+    lines = looks(one.candidate for one in found.placed)
     for one in (one for one in found.placed if one.quantity == band.quantity):
-        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **look[one.candidate])
+        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **lines[one.candidate])
     bottom, top = min(np.nanmin(low), 0 if band.distance else np.nanmin(-bar)), max(np.nanmax(high), np.nanmax(bar))
     room = _BEYOND * (top - bottom) or 1.0
     axes.set_ylim(-0.03 * room if band.distance else bottom - room / 2, top + room / (1 if band.distance else 2))

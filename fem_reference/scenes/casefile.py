@@ -285,6 +285,9 @@ def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, p
             if effect.support is not None and in_situ.among(acting) is None:
                 got = f"{effect.support:g} mm"
                 raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')
+            if effect.friction is not None and in_situ.among(acting) is not None:
+                want = 'none beside "in_situ", which balances pressures at rest without friction'
+                raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
             raise InputError(join(place, "frames.interval"), "nothing", want)

@@ -214,5 +214,12 @@ _TABLE = TableRow(
     | {"collision": {"gap": "0.5 mm", "stiffness": 1.0}},
 )
 SOLVES = (
-    MuscleSolver(settings=MassSpringSettings, solve=solve, moves="tetrahedra", example=_EXAMPLE, table=(_TABLE,)),
+    MuscleSolver(
+        settings=MassSpringSettings,
+        solve=solve,
+        moves="tetrahedra",
+        example=_EXAMPLE,
+        depends_on=("size",),
+        table=(_TABLE,),
+    ),
 )

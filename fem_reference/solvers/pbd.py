@@ -203,6 +203,7 @@ SOLVES = (
         settings=PbdSettings,
         solve=solve,
         example=_EXAMPLE,
+        depends_on=("order",),
         table=(_TABLE,),
         fibres=lambda settings: settings.anisotropy is not None,
     ),

@@ -225,6 +225,7 @@ SOLVES = (
         settings=ProgramSettings,
         solve=solve,
         example=_EXAMPLE,
+        depends_on=("order", "size"),
         table=(_TABLE,),
         fibres=lambda settings: settings.anisotropy is not None,
     ),

@@ -218,4 +218,6 @@ _TABLE = TableRow(
     | {"stretch": "0.4 N/mm", "bending": "0.3 N mm", "volume": "10 MPa"}
     | {"collision": {"gap": "0 mm", "stiffness": "500 kPa/mm"}},
 )
-SOLVES = (MuscleSolver(settings=XpbdSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,)),)
+SOLVES = (
+    MuscleSolver(settings=XpbdSettings, solve=solve, example=_EXAMPLE, depends_on=("order", "size"), table=(_TABLE,)),
+)

@@ -37,27 +37,12 @@ def calibrate_case(
     store: str | Path = STORE,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Fit numbers of a case to measurements, by runs of its reference at the size that the case has.
+    """Fit numbers of the case of a muscle to measurements, by runs of its reference at the size that the case has.
 
-    Parameters
-    ----------
-    case
-        The case of a muscle.
-    data
-        A CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them.
-    fit
-        Keys of numbers that have a range, such as ``"effect[0].mu"``.
-    store
-        The folder that runs are stored in.
-    progress
-        Called with each line of progress.
-
-    Returns
-    -------
-    Calibration
-        ``estimates``, each with its ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the
-        parameter; ``holds``: True where the fit converged, the law follows the data, and all numbers are determined.
-
+    ``data``: a CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them;
+    ``fit``: keys of numbers that have a range, such as ``"effect[0].mu"``. The result has ``estimates``, each with its
+    ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the parameter, and ``holds``: True
+    where the fit converged, the law follows the data, and all numbers are determined.
     """
     muscle = casefile.muscle(arguments.check_case(case))
     keys, folder = arguments.check_keys(fit), arguments.free_folder(store, "store")

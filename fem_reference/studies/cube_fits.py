@@ -42,12 +42,16 @@ def shipped_law() -> Fitted:
 
 def collagen_law(most: int = _MOST) -> Fitted:
     """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at most so many
-    evaluations; no published range.
+    evaluations. Only the fibres have a published range: no publication that was read fits ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)
     fibres, k1, k2 = ended.parameters
-    parameters = {"stress of the fibres [MPa]": (fibres, None), "k1 [MPa]": (k1, None), "k2": (k2, None)}
+    ends = type(SHIPPED[2]).published["stress"]
+    low, high = (
+        float(make("fibre_passive", **(FIBRES | {"stress": end})).parameters[0][1]) for end in (ends.low, ends.high)
+    )
+    parameters = {"stress of the fibres [MPa]": (fibres, (low, high)), "k1 [MPa]": (k1, None), "k2": (k2, None)}
     return _of("with collagen across the fibres", parameters, with_collagen(fibres, k1, k2), to, ended)
 
 

@@ -1,7 +1,7 @@
 """The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -19,10 +19,10 @@ from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import Watch
 from fem_reference.runs import store
 from fem_reference.runs.key import code_hash, key, machine, versions
-from fem_reference.runs.store import Frame, Run, collected
+from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
 from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
+from fem_reference.scenes.case import MACHINE_ONLY, Candidate, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import AnySolver
@@ -110,6 +110,12 @@ class Bench[C: Case]:
         """The run of the case's reference."""
         return self.obtain("reference", self.scene.reference, "reference")
 
+    def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> Iterator[Run]:
+        """The reference and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
+        read = {one.name: self.read(one.name, one, place) for one, place in chosen if one.solver == "recorded"}
+        yield self.reference()
+        yield from (read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen)
+
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""
         other = Bench(self.scene, self.store, self.ranks)
@@ -182,7 +188,13 @@ class Bench[C: Case]:
         if wanted.offer.fills(wanted.settings):
             origin["mesh"] = self._problem().mesh_facts
         identity = {"name": wanted.name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
-        making.write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(solver))
+        writer, offer = Writer(wanted.folder, identity, given.rest), wanted.offer
+
+        def solve(sink: Sink) -> Outcome:
+            sofar = (given, wanted.settings, sink)
+            return offer.go_on(*sofar, writer.cut_off) if offer.go_on else offer.solve(*sofar)
+
+        making.write(writer, solve, self._watched(solver))
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -19,9 +19,8 @@ from fem_reference.problems import of_case, scalar
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run, complete
-from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.scalar import Element, ScalarCase
-from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
@@ -29,14 +28,6 @@ log = logging.getLogger(__name__)
 _REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
 _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
-
-
-def judged(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> Comparison:
-    """The reference of a case and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
-    read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
-    reference = bench.reference()
-    runs = [read.get(entry.name) or bench.obtain(entry.name, entry, place) for entry, place in chosen]
-    return compare(bench, reference, runs, refinement.offered(bench, reference, asked=error_bars))
 
 
 def compare(

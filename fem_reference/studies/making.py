@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,11 +17,10 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.subprocesses import MachineTime, forget_peak_memory, peak_memory
 from fem_reference.io import files
 from fem_reference.problems.estimates import Decision
-from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.stresses import Watch
 from fem_reference.runs import states, store
 from fem_reference.runs.key import versions
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.runs.writer import Writer, places
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.protocol import AnySolver
@@ -99,7 +98,7 @@ def _stop_for(found: Sequence[Decision]) -> None:
         raise StoppedError(f"{titles}, left out, turned out to matter at frame {found[0].turned_out}")
 
 
-def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
+def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None) -> None:
     """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state."""
 
     def add(frame: Frame) -> None:
@@ -110,10 +109,9 @@ def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None)
     if watch is not None:
         list(seen(watch, writer.folder, writer.frames))  # stored by a process before this one
     forget_peak_memory()
-    began, clock, solve, go_on = time.process_time(), MachineTime.now(), wanted.offer.solve, wanted.offer.go_on
+    began, clock = time.process_time(), MachineTime.now()
     try:
-        sofar = (given, wanted.settings, add)
-        outcome = go_on(*sofar, writer.cut_off) if go_on else solve(*sofar)
+        outcome = solve(add)
         if watch is not None and outcome.status == "converged":
             _stop_for(watch.end())
     except StoppedError as why:
@@ -125,8 +123,8 @@ def write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None)
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
     outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own says what those used
     if not writer.frames:
-        rest = given.rest
-        writer.add(Frame(given.frames[0], rest.surface.points, rest.fibres.points if rest.fibres else None))
+        rest = writer.rest
+        writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))
     names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
     writer.close(outcome, **_contact(writer.state), **names)
 

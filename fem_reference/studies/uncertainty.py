@@ -107,7 +107,9 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
         if bone.motion is not None and f"force_on_{bone.name}_x" in comparison.reference.scalars:
             own, *forces = (np.linalg.norm(run.force(bone.name), axis=1) for run in (comparison.reference, *whole))
             empty = _empty(comparison, f"{FORCE}{bone.name}", f"Force of the muscle on {bone.name}", "N", own)
-            yield bands.of_values(empty, design, _rows(forces, own))
+            bars = comparison.error_bars
+            bar = None if bars is None else bars.find("change", "force_on_bone", bone.name)
+            yield bands.of_values(replace(empty, bar=None if bar is None else bar.values), design, _rows(forces, own))
 
 
 def _rows(found: Sequence[Floats], like: Floats) -> Floats:

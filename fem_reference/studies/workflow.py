@@ -25,20 +25,9 @@ STORE = Path("reports/runs")
 
 
 def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
-    """Read a case.
-
-    Parameters
-    ----------
-    case
-        The name of a shipped case, a folder with a ``case.toml``, or a scene file.
-    changes
-        Keys such as ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them.
-
-    Raises
-    ------
-    InputError
-        Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
-
+    """Read a ``case``: the name of a shipped one, a folder with a ``case.toml``, or a scene file; with ``changes``: keys such as
+    ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them. InputError where a key is missing,
+    unknown or wrong; it names file, key, what was got and what is wanted.
     """
     arguments.check_changes(changes)
     path(case, "case")
@@ -55,26 +44,11 @@ def solve(
 ) -> Run:
     """Solve a case, or read its stored run: runs are stored under all that determines them.
 
-    Parameters
-    ----------
-    case
-        What :func:`load_case` read.
-    solver
-        The name of a solver, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
-        :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case.
-    store
-        The folder that runs are stored in.
-    progress
-        Called with each line of progress.
-    settings
-        Of the ``solver``, as scene files write them; without any those that the case has for it, or else the page table-5-1.
-
-    Returns
-    -------
-    Run
-        ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost), ``folder``.
-        Where physics fails, the status says so and the frames that were reached are there.
-
+    ``solver``: the name of one, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
+    :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
+    are of the ``solver``, as scene files write them; without any those that the case has for it, or else the page table-5-1. The
+    run has ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost) and
+    ``folder``. Where physics fails, the status says so and the frames that were reached are there.
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings)
@@ -96,27 +70,11 @@ def _chosen(
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
-    """Read frames that another program wrote, and check them against the case.
+    """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in its order.
 
-    Parameters
-    ----------
-    folder
-        A folder of meshes, one a frame, or a file of a sequence; a ``candidate.toml`` in it may say name and unit.
-    case
-        The case that they are frames of: the vertices are those of its muscle's surface, in its order.
-    unit
-        The unit of length of the frames, by default what ``candidate.toml`` says, else mm.
-
-    Returns
-    -------
-    Run
-        ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number.
-
-    Raises
-    ------
-    InputError
-        Where a file cannot be read whole, or its vertices or its first frame are not those of the case.
-
+    ``folder``: one of meshes, one a frame, or a file of a sequence; a ``candidate.toml`` in it may say name and unit. ``unit``:
+    that of length, by default what ``candidate.toml`` says, else mm. InputError where a file cannot be read whole, or its vertices
+    or its first frame are not those of the case.
     """
     arguments.check_case(case)
     choice = recorded.choice(path(folder, "folder"), unit)
@@ -138,26 +96,12 @@ def error_bars(
 def error_bars(
     case: Case | Body, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | BodyBars | None:
-    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact;
-    or that of a body on cells of its shape, from a solution on smaller cells or with more unknowns in each.
+    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a body
+    on cells of its shape, from a solution on smaller cells or with more unknowns in each.
 
-    Parameters
-    ----------
-    case
-        The case of the reference, or the body.
-    reference
-        The result of :func:`solve` without a ``solver``, or of :func:`solve_body`.
-    store
-        The folder that runs are stored in; bars are kept beside the reference's run. Those of a body are not stored.
-    progress
-        Called with each line of progress.
-
-    Returns
-    -------
-    ErrorBars, BodyBars or None
-        By statistic a bar for each frame, in the unit of the statistic; of a body, of its points, forces, moments and energy. None
-        where the reference did not converge.
-
+    ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`. By
+    statistic a bar for each frame, in the unit of the statistic; of a body, of its points, forces, moments and energy. None where
+    the reference did not converge.
     """
     with reported(progress):
         if arguments.is_of_body(reference, case):
@@ -173,22 +117,9 @@ def compare(
 ) -> Comparison:
     """Measure candidates against the reference of a case, and judge its expectations.
 
-    Parameters
-    ----------
-    case
-        The case that all runs are of.
-    reference
-        The run that counts as the truth.
-    candidates
-        Runs to measure against it. A frame that a run did not reach is NaN, and never a pass.
-    error_bars
-        Those of the reference, from :func:`error_bars`. With them a verdict that they leave in doubt is inconclusive.
-
-    Returns
-    -------
-    Comparison
-        ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values`` (f,), ``unit``, ``worst`` frame.
-
+    A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
+    verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``
+    (f,), ``unit``, ``worst`` frame.
     """
     arguments.check_case(case)
     arguments.check_runs(reference, candidates, case)
@@ -198,27 +129,10 @@ def compare(
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
-    """Write all that another program needs to solve a case.
+    """Write all that another program needs to solve a case into a new or empty ``folder``; the names of the files.
 
-    Parameters
-    ----------
-    case
-        What :func:`load_case` read.
-    folder
-        A new or empty folder.
-    form
-        ``"open"``: PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too.
-
-    Returns
-    -------
-    list of str
-        The names of the files.
-
-    Raises
-    ------
-    InputError
-        Where ``folder`` is not empty, or FEBio has not the same effects.
-
+    ``form``: ``"open"``, PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too. InputError where
+    ``folder`` is not empty, or FEBio has not the same effects.
     """
     arguments.check_case(case)
     muscle = casefile.muscle(case)
@@ -226,25 +140,10 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
 
 
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
-    """Write the runs of a muscle for ParaView: ``runs.pvd`` opens all frames, with named blocks and arrays on them.
+    """Write the runs of a muscle for ParaView into a new or empty ``folder``; the names of the files, or InputError.
 
-    Parameters
-    ----------
-    comparison
-        From :func:`compare`. Stress, pressure and det F are there if its reference was solved with ``store_state = true``.
-    folder
-        A new or empty folder.
-
-    Returns
-    -------
-    list of str
-        The names of the files; the README.md among them says what each array is.
-
-    Raises
-    ------
-    InputError
-        Where ``folder`` is not empty.
-
+    ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files says what each array is.
+    Stress, pressure and det F are there if the reference was solved with ``store_state = true``.
     """
     arguments.check_comparison(comparison)
     return paraview.write(comparison, arguments.free_folder(folder, "folder"))
@@ -257,24 +156,11 @@ def write_report(comparison: Comparison, folder: str | Path) -> Path:
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Run:
-    """Solve a body of any shape with the reference, FEniCSx.
+    """Solve a body of any shape, whose prescribed displacements may be functions of your own, with the reference, FEniCSx.
 
-    Parameters
-    ----------
-    body
-        Cells, effects, prescribed displacements of regions, and the requested frames. A prescribed displacement may be a
-        function of the caller's own.
-    progress
-        Called with each line of progress.
-    settings
-        As under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ...
-
-    Returns
-    -------
-    Run
-        ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement;
-        the ``outcome``. :func:`error_bars` estimates the error of cells of this size.
-
+    ``settings`` are as under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ... The run has
+    ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement, and
+    the ``outcome``. :func:`error_bars` estimates the error of cells of this size.
     """
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")

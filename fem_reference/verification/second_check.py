@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from fem_reference import effects
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
-from fem_reference.assessment.run_checks import of_muscle
+from fem_reference.assessment.run_checks import of_body, of_muscle
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Vector
 from fem_reference.problems.muscle import MuscleProblem
@@ -17,6 +17,7 @@ from fem_reference.runs.store import Run
 from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
 from fem_reference.verification.parts import control
+from fem_reference.verification.touching import BLOCK_STIFFNESS, pressed_blocks
 
 CORNER, FAR_SIDE = (0.0, 0.0, 0.0), (10.0, 5.0, 20.0)  # of the bar at rest [mm]; the corner is attached
 Mistake = Callable[[MuscleProblem, Run], tuple[MuscleProblem, Run]]
@@ -97,27 +98,49 @@ def pushed(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     return replace(problem, bones=bar("5 mm").bones), run
 
 
-ENTRIES = tuple(
-    Entry(
+MISTAKES = (
+    ("order", "two frames in each other's place", swapped),
+    ("frames", "its last frame missing", missing),
+    ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
+    ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
+    ("bone", "the ball 3 mm farther, within the bar", pushed),
+    ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
+)
+
+
+def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
+    """The number of checks that are not met by two blocks pressed together, the side of one then moved ``farther`` [mm] into the
+    other.
+    """
+    body = pressed_blocks(BLOCK_STIFFNESS)
+    run = lab.solve(body, "P2/P1", first_step=0.5)
+    points = run.last.points.copy()
+    points[np.unique(body.mesh.facets["high_z0"]), 2] -= farther
+    run = replace(run, states=(*run.states[:-1], replace(run.last, points=points)))
+    lost = [str(one) for one in of_body(body, run) if not one.met]
+    return Finding(float(len(lost)), note="; ".join(lost))
+
+
+def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **mistake: object) -> Entry:
+    return Entry(
         name=f"second_check_{name}",
         group="second check",
-        title=f"A run of a bar between two bones, into which a ball is pressed, passes the second check; not with {words}",
+        title=f"A run of {what} passes the second check; not with {words}",
         unit="1",
-        measure=denials,
+        measure=measure,
         given={},
-        **control(words, mistake=mistake),
+        **control(words, **mistake),
         truth=0.0,
         within=0.5,
         because="it counts the checks that are not met",
         kind="property",
         source="fem_reference/assessment/run_checks.py",
     )
-    for name, words, mistake in (
-        ("order", "two frames in each other's place", swapped),
-        ("frames", "its last frame missing", missing),
-        ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
-        ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
-        ("bone", "the ball 3 mm farther, within the bar", pushed),
-        ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
-    )
+
+
+BAR = "a bar between two bones, into which a ball is pressed,"
+BLOCKS = "two blocks pressed together"
+ENTRIES = (
+    *(_entry(name, BAR, words, denials, mistake=mistake) for name, words, mistake in MISTAKES),
+    _entry("touching", BLOCKS, "the side of one 0.1 mm farther in the other", touching_denials, farther=0.1),
 )

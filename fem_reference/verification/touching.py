@@ -40,15 +40,19 @@ def _lowered(name: str, path: float, components: tuple[int, ...]) -> Prescribed:
     return Prescribed(name, name, components, Affine(NO_GRADIENT, (0.0, 0.0, -path)))
 
 
-def blocks(lab: Lab, stiffness: float) -> Finding:
-    """The force [N] between two blocks with unrelated meshes, as high as wide together, as the upper one is moved down."""
+def pressed_blocks(stiffness: float) -> Body:
+    """Two blocks with unrelated meshes, as high as wide together; the upper one is moved down."""
     low, high = (shapes.box(counts, (1.0, 1.0, 0.5), "tetrahedron") for counts in ((3, 3, 2), (4, 5, 2)))
     mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0, 0, 0.5])})
     moved = _lowered("high_z1", TRAVEL, (2,))
     prescribed = (*_mirrors("low", "high"), *clamped("low_z0", components=(2,)), moved)
     law = Touching("low_z1", "high_z0", stiffness, 0.002)
-    body = Body(mesh, neo_hooke(MU, SOFT), prescribed, (0.0, 1.0), touching=(law,))
-    state = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-11).last
+    return Body(mesh, neo_hooke(MU, SOFT), prescribed, (0.0, 1.0), touching=(law,))
+
+
+def blocks(lab: Lab, stiffness: float) -> Finding:
+    """The force [N] between the pressed blocks."""
+    state = lab.solve(pressed_blocks(stiffness), "P2/P1", first_step=0.5, residual=1e-11).last
     # On an area of 1 mm2.
     most = state.scalars["touching_pressure"] / -float(state.forces["high_z1"][2])
     return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} of the mean one")

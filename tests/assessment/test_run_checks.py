@@ -20,6 +20,7 @@ from fem_reference.problems import shapes as bodies
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Affine
+from fem_reference.problems.touching import Touching
 from fem_reference.runs.store import Frame, Run, collected
 
 BONES = ("floor", "lid")
@@ -247,3 +248,28 @@ def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:
         _ = denied.last
     free = [true[0], true[1] + [0.0, 0.0, 3.0], true[2]]  # z is not prescribed
     assert wrong(solved(free)) == []
+
+
+def test_parts_that_touch_overlap_by_the_give_of_contact() -> None:
+    """Boxes whose corners lie on each other: the upper one 0.1 mm in the lower one, as 0.2 MPa over 2 MPa/mm allow."""
+    low, high = (
+        bodies.box((4, 4, 4), (1.0, 1.0, 1.0), "tetrahedron"),
+        bodies.box((4, 4, 4), (1.0, 1.0, 1.0), "tetrahedron"),
+    )
+    mesh = bodies.joined({"low": low, "high": replace(high, points=high.points + [0, 0, 1.0])})
+    law = Touching("low_z1", "high_z0", 2.0, 0.01)
+    body = Body(mesh, (), (), (0.0, 1.0, 2.0), touching=(law,))
+    upper = (np.arange(len(mesh.points)) >= len(low.points))[:, None]
+
+    def wrong(depth: float, pressure: float, body: Body = body) -> list[tuple[str, float]]:
+        """What is not met where the upper box is ``depth`` in the lower one in the middle frame."""
+        scalars = {"touching_pressure": pressure}
+        places = [mesh.points, mesh.points - upper * [0.0, 0.0, depth], mesh.points]
+        frames = [Frame(float(i), points=at, scalars=scalars) for i, at in enumerate(places)]
+        return [(check.name, check.frame) for check in of_body(body, collected(frames, CONVERGED)) if not check.met]
+
+    assert wrong(0.1, 0.2) == []
+    assert wrong(0.1, 0.0) == [("low_z1 in high_z0", 1.0)]  # the same places, and contact that was lost
+    assert wrong(0.1, np.nan) == [("low_z1 in high_z0", 0.0)]
+    assert wrong(-0.1, 0.0) == []
+    assert wrong(0.1, 0.0, replace(body, touching=())) == []

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.distance import distances, farthest_points, inside, outer_windings
+from fem_reference.geometry.distance import distances, farthest_points, flattened, inside, outer_windings
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 CUBE = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))
@@ -125,3 +125,11 @@ def test_farthest_points_spread() -> None:
     # An end, the other, the middle, the quarters: each furthest from those before.
     assert farthest_points(line, 5).tolist() == [0, 100, 50, 25, 75]
     assert sorted(farthest_points(line[:3], 5)) == [0, 1, 2]
+
+
+def test_a_flat_triangle_is_off_a_round_surface_by_its_edges() -> None:
+    # Corners of an equilateral triangle of edge 1 on a sphere of radius 10: R - sqrt(R^2 - 1/3), times R; the next term of the
+    # series is 1/12 of R^-2 of it.
+    points = np.vstack([np.eye(3), 2 * np.eye(3)[:1]]) / np.sqrt(2)
+    surface = Surface(points, np.array([[0, 1, 2], [1, 2, 3]]))
+    assert flattened(surface, np.array([0.0, 0.4, 0.4])) == pytest.approx(10 * (10 - np.sqrt(100 - 1 / 3)), rel=1e-3)

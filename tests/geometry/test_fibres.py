@@ -111,13 +111,15 @@ def test_the_same_mesh_gives_the_same_lines() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_lines_move_with_the_mesh(seed: int) -> None:
-    ring = _ring(1)
-    turn = Rotation.random(rng=np.random.default_rng(seed))
-    moved = TetMesh(turn.apply(ring.points) + HIP, ring.tets, ring.facets)
+def test_turned_moved_scaled_and_renumbered_meshes_have_the_same_lines(seed: int) -> None:
+    """Of a ring whose points are a little off, as lines that are equally far apart are chosen by their number."""
+    ring, rng = _ring(1), np.random.default_rng(seed)
+    ring = TetMesh(ring.points + rng.normal(scale=0.05, size=ring.points.shape), ring.tets, ring.facets)
+    turn = Rotation.random(rng=rng)
+    moved = shapes.renumbered(TetMesh(3 * turn.apply(ring.points) + HIP, ring.tets, ring.facets), seed)
     lines, found = trace(ring, "bottom", "top", 8), trace(moved, "bottom", "top", 8)
     # Round-off of the field (1e-12 relative) grows along the line.
-    assert_allclose(found.points, turn.apply(lines.points) + HIP, rtol=0, atol=1e-6)
+    assert_allclose(found.points, 3 * turn.apply(lines.points) + HIP, rtol=0, atol=1e-6)
 
 
 def test_lines_that_leave_the_body_are_replaced_by_others() -> None:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, TetMesh, boundary, tet_volumes, triangle_areas
+from fem_reference.geometry.embedding import embed
 from fem_reference.geometry.fibres import fibre_field, trace
 from fem_reference.geometry.flux_fibres import MOST, Flow, area_flux, streamlines
 from fem_reference.problems.fibre_ends import ends_of
@@ -123,11 +124,21 @@ def test_attachments_that_touch_still_give_fibres() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_lines_move_with_the_mesh(seed: int) -> None:
+def test_turned_moved_scaled_and_renumbered_meshes_have_the_same_directions_and_lines(seed: int) -> None:
+    """Lines start along the facets in their order: in another order they are others, as evenly over the same area."""
     turn, shift = Rotation.random(rng=np.random.default_rng(seed)), np.array([30.0, -70, 20])
-    moved = TetMesh(turn.apply(SHEET.points) + shift, SHEET.tets, SHEET.facets)
-    one, other = (streamlines(area_flux(mesh, "bottom", "end"), 12) for mesh in (SHEET, moved))
-    assert_allclose(other.points, turn.apply(one.points) + shift, atol=1e-6)
+    moved = TetMesh(3 * turn.apply(SHEET.points) + shift, SHEET.tets, SHEET.facets)
+    fluxes = [area_flux(mesh, "bottom", "end") for mesh in (SHEET, moved, shapes.renumbered(moved, seed))]
+    one, other, again = (streamlines(flux, 12) for flux in fluxes)
+    assert_allclose(other.points, 3 * turn.apply(one.points) + shift, atol=1e-6)
+    fields = []
+    for flux, at in zip(fluxes, (SHEET.points, moved.points, moved.points), strict=True):
+        middles = at[SHEET.tets].mean(axis=1)
+        cells = embed(flux.mesh, middles).tets
+        fields.append(flux.field(cells, middles))
+    assert_allclose(fields[1], turn.apply(fields[0]), atol=1e-9)
+    assert_allclose(fields[2], fields[1], atol=1e-9)
+    assert again.lengths().mean() == pytest.approx(other.lengths().mean(), rel=0.05)
 
 
 def test_the_other_way_round_lines_run_the_other_way() -> None:

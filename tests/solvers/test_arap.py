@@ -213,17 +213,6 @@ def test_independent_of_where_the_world_is(fixed, volume_step):
     np.testing.assert_allclose(there[10], apply(TURN, here[10]), rtol=0, atol=1e-7)
 
 
-def test_independent_of_the_order_of_vertices():
-    setup = attached_setup(None, SWING, last=5)
-    order = np.random.default_rng(3).permutation(len(setup.surface.points))
-    place = np.argsort(order)
-    surface = Surface(setup.surface.points[order], place[setup.surface.triangles])
-    attached = tuple(AttachedVertices(one.attachment, one.bone, place[one.vertices]) for one in setup.attached)
-    _, one = run(setup)
-    _, other = run(Setup(surface, setup.bones, attached, setup.frames, None))
-    np.testing.assert_allclose(other[5][place], one[5], rtol=0, atol=1e-10)
-
-
 def test_kept_negative_weights_may_not_let_rest_stay():
     # Where the two lesser eigenvalues of a cell's covariance have a negative sum, a half turn has less energy than none.
     setup = attached_setup(None, None, muscle(noise=3.0, seed=4))

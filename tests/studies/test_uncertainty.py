@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapes
 import small
 import stand_ins
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.io import files
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -24,6 +26,7 @@ PARALLEL = [
     {"key": "effect[1].c1", "low": "2 kPa", "high": "5 kPa", "source": "made up"},
 ]
 
+PULLED = {"bone[1].motion": SLIDE, "frames.every": 10, "candidate": [], "expect": []}
 PBD = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.05, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
 
@@ -34,9 +37,43 @@ def pulled(folder: Path, changes: dict[str, object]) -> MuscleCase:
         {"name": "mooney_rivlin", "c1": "3 kPa", "c2": "0 kPa"},
         {"name": "incompressible", "bulk": "10 MPa"},
     ]
-    own = {"bone[1].motion": SLIDE, "effect": effects, "frames.every": 10, "candidate": [], "expect": []}
-    case = casefile.read_muscle(small.write(folder / "bar"), own | changes)
+    case = casefile.read_muscle(small.write(folder / "bar"), PULLED | {"effect": effects} | changes)
     return case.model_copy(update={"negative_control": None})
+
+
+SERIES = [
+    {"key": "effect[0].mu", "low": "8 kPa", "high": "12 kPa", "source": "made up"},
+    {"key": "effect[1].mu", "low": "6 kPa", "high": "18 kPa", "source": "made up"},
+]
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_regions_in_series_share_the_force_as_springs_do(tmp_path: Path) -> None:
+    """Two halves of a bar, mirror images of each other: the force is that of springs mu and nu in series, mu nu / (mu + nu) times a
+    number of its shape. Beside that is how the halves keep each other from narrowing, of second order in the difference of moduli.
+    Sensitivities by the mean over a fine grid of one of them, of this closed form.
+    """
+    halves = [{"name": "neo_hooke", "in": side, "mu": "10 kPa"} for side in ("upper", "not upper")]
+    upper = {
+        "name": "upper",
+        "width": "0 mm",
+        "field": {"start": "origin", "end": "insertion", "first": 0.5, "last": 1.0},
+    }
+    own = {"region": [upper], "muscle.mesher": "block", "muscle.tet_size": "5 mm", "uncertain": SERIES}
+    files.write_surface(
+        small.write(tmp_path / "bar") / "bar.vtp", bar := shapes.skin(shapes.box((2, 2, 8), (10, 10, 40))), bar.points
+    )
+    changes = PULLED | own | {"effect": [*halves, {"name": "incompressible", "bulk": "10 MPa"}]}
+    case = casefile.read_muscle(tmp_path / "bar", changes).model_copy(update={"negative_control": None})
+    found = uncertainty.study(case, tmp_path / "runs", Workers(), runs=24)
+    force = next(band for band in found.bands if band.quantity == "force on lid")
+    mu, nu = np.meshgrid(np.linspace(8, 12, 401), np.linspace(6, 18, 401), indexing="ij")
+    springs = mu * nu / (mu + nu)
+    first = np.array([springs.mean(axis=1).var(), springs.mean(axis=0).var()]) / springs.var()
+    assert list(force.first.values()) == pytest.approx(first, rel=0.01)
+    assert list(force.total.values()) == pytest.approx(1 - first[::-1], rel=0.01)
+    assert force.error < 1e-4
 
 
 @pytest.mark.slow

@@ -79,13 +79,15 @@ class Solver[P, S: Record]:
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``:
     for a solver that simulates the effects of a scene, else None; ``fibres``: True where a surface solver needs fibres under such
-    settings. Without them it receives a ``Setup``, as the muscle is not filled for it.
+    settings. Without them it receives a ``Setup``, as the muscle is not filled for it. ``depends_on``: what its answer depends on
+    although the scene is the same: the order of vertices, or the size, by lengths or times of its own.
     """
 
     task = "solve"
     solves = "muscles"
 
     moves: Moves = "surface"
+    depends_on: tuple[Literal["order", "size"], ...] = ()
     check_effects: CheckEffects[S] | None = None
     fibres: Callable[[S], bool] = lambda _: False
 

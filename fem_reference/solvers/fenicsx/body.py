@@ -42,7 +42,7 @@ class AssembledBody:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
-        self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse, body.effects
+        self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.rubs, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
         self.conserves = not any(changed)  # True where no energy changes without deformation of the body
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
@@ -74,8 +74,8 @@ class AssembledBody:
         self.path = Path(self.system, self.determinants)
         if form.rest is not None:
             self.path.settle(self.energy(), connected=False)
-        contacts = (one for one in (self.contact, self.touching) if one is not None)
-        self.checks: tuple[StateCheck, ...] = *contacts, self.determinants, self.validity, self.path, self
+        self.contacts = tuple(one for one in (self.contact, self.touching) if one is not None)
+        self.checks: tuple[StateCheck, ...] = *self.contacts, self.determinants, self.validity, self.path, self
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the last examined state
@@ -106,6 +106,8 @@ class AssembledBody:
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
+        if self.touching:
+            self.touching.settle()
         self.path.settle(self.energy(), connected=False)
 
     @property
@@ -135,26 +137,24 @@ class AssembledBody:
         halfway state is solved where work and energy disagree.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
-        looked = False
+        looked = list[bool]()
 
         def halfway() -> bool:
-            nonlocal looked
-            looked = True
+            looked.append(True)
             self.go_back(before)
             self.set_frame(middle)
             found = self.newton.solve_among(self.contact, middle)
             self.newton.thrown += found.iterations
             return found.converged and self.determinants.smallest().value > 0
 
-        looks = self.judged and self.conserves and not self.clock.matters
-        self.path.settle(self.energy(), halfway if looks else None)
+        self.path.settle(self.energy(), halfway if self.judged and self.conserves and not self.clock.matters else None)
         if looked:
             self.set_frame(frame)
             self.system.contact = contact
             if self.contact:
                 self.contact.update(frame)
-        if self.contact:
-            self.contact.settle()
+        for one in self.contacts:
+            one.settle()
         self.clock.settle(frame, after)
         self.at = frame
 
@@ -197,8 +197,8 @@ class AssembledBody:
     def arrive(self, frame: float) -> None:
         """Take the present state as that of ``frame``; no load step led to it."""
         self.at = frame
-        if self.contact:
-            self.contact.settle()
+        for one in self.contacts:
+            one.settle()
         self.path.settle(self.energy(), connected=False)
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
@@ -290,7 +290,8 @@ class AssembledBody:
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    symmetric = all(one.stored for one in body.effects if isinstance(one, Load))  # all others have an energy
+    # All others have an energy.
+    symmetric = not body.rubs and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
         system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it

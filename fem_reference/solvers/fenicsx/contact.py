@@ -5,7 +5,7 @@ load step that begins and ends without contact pressure is solved without contac
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +19,7 @@ from fem_reference.problems.contact import ContactBone, ContactLaw, nearest_on_p
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
+from fem_reference.solvers.fenicsx.friction import Friction, Grip
 from fem_reference.solvers.fenicsx.spent import Spent
 
 # A point deeper in a bone than this share of its half thickness counts as through.
@@ -32,7 +33,7 @@ _RIM = 0.25
 class Pressed:
     """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,); no other point is within the
     smoothing. Of the ``pressed`` points (k,) among them: the ``pressure`` (k,) [MPa per rest area], the ``traction`` (k, 3) and
-    its derivative ``slope`` (k, 3, 3) [MPa/mm].
+    its derivative ``slope`` (k, 3, 3) [MPa/mm], with those of friction, and its ``grip``.
     """
 
     near: Ints
@@ -41,6 +42,7 @@ class Pressed:
     pressure: Floats
     traction: Floats
     slope: Floats
+    grip: Grip | None = None
 
 
 # Tractions (n, 3) [MPa] at points (n,), which may repeat.
@@ -63,6 +65,7 @@ class ContactForces:
         self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
+        self.friction, self.dissipated = list[Friction](), 0.0
         self.look()
         self.update(frame)
         self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # at rest, at most
@@ -71,6 +74,9 @@ class ContactForces:
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
             self.update(frame)
         self.settle()
+        if law.friction is not None:
+            self.friction = [Friction(law, self._held(i)) for i in range(len(bones))]
+            self.settle()
 
     def look(self) -> None:
         """Look for points as far from each bone as it is felt with the overlaps at rest, or supports them there."""
@@ -96,7 +102,26 @@ class ContactForces:
         pressure, change, sampled = pressure[some], change[some], Sampled(gap[some], gradient[some], bend[some])
         normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
         slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-        return Pressed(near, gap, near[some], pressure, pressure[:, None] * normal, slope)
+        found = Pressed(near, gap, near[some], pressure, pressure[:, None] * normal, slope)
+        if not self.friction:
+            return found
+        gaps = sampled._replace(distance=sampled.distance + allowed[some])
+        grip = self.friction[i].grip(found.pressed, local(found.pressed), gaps, partial(self._before, i))
+        own = found.traction + grip.traction @ turn.T, slope + turn @ grip.slope @ turn.T
+        return replace(found, traction=own[0], slope=own[1], grip=grip)
+
+    def _held(self, i: int) -> Floats:
+        """The places (n, 3) [mm] of the points in the frame of a bone that presses them; not a number where it does not."""
+        found, some = np.full(self.points.rest.shape, np.nan), self.now[i].pressed
+        found[some] = self._local(i, self.frame, self.moved, some)
+        return found
+
+    def _before(self, i: int, which: Ints) -> tuple[Floats, Floats]:
+        """The places (k, 3) [mm] of points ``which`` (k,) in the frame of a bone in the settled state, and their gaps (k,) [mm]."""
+        _, frame, moved = self.settled
+        places = self._local(i, frame, moved, which)
+        gap = self.bones[i].shape.sample(places).distance
+        return places, gap + self.law.allowance(frame) * self.overlaps[i][which]
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
         """The positions (k, 3) [mm] of ``some`` points (k,) in the frame of a bone at ``frame``, with nodes ``moved`` (m, 3)."""
@@ -154,7 +179,8 @@ class ContactForces:
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point; the rest area in contact,
         ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries, ``contact_points_near``; and
-        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm], where it is removed or, in situ, stays.
+        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm], where it is removed or, in situ, stays. With
+        friction its dissipated work since the start, ``friction_work`` [N mm].
         """
         comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
         depth = pressure = 0.0
@@ -170,6 +196,7 @@ class ContactForces:
             "contact_points": float(touched.sum()),
             "contact_points_near": float(sum(len(one.near) for one in self.now)),
         }
+        sums |= {"friction_work": self.dissipated} if self.friction else {}
         found = {name: comm.allreduce(value, MPI.MAX) for name, value in greatest.items()}
         return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
@@ -184,9 +211,16 @@ class ContactForces:
 
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
+        for friction, one in zip(self.friction, self.now, strict=False):
+            if one.grip is not None:
+                friction.settle(one.grip)
+                self.dissipated += float(self.points.areas[one.pressed] @ one.grip.lost)
         self.settled = self.now, self.frame, self.moved
-        for one in self.nearby:
-            one.met[:] = False
+        if self.friction:
+            self.update(self.frame)
+            self.settled = self.now, self.frame, self.moved
+        for nearby in self.nearby:
+            nearby.met[:] = False
 
     def go_back(self) -> None:
         """Restore the settled state, as the unknowns have been."""

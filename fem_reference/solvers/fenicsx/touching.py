@@ -9,11 +9,11 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
-from fem_reference.problems.overlaps import overlap
+from fem_reference.problems.overlaps import beyond_rim, overlap
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.meshes import Displacement
+from fem_reference.solvers.fenicsx.meshes import Displacement, local_facets
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
 
@@ -29,15 +29,25 @@ class TouchingForces:
         for law in body.touching:
             low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
             self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
+        self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
-        self.look()
+        self.settle()
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
         ]
         for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching)]:
             if depth > law.smoothing:
                 raise ArithmeticError(f'"{law.one}" and "{law.other}" overlap by {depth:.3g} mm')
+
+    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
+        """By pass the skin around the other part, that its points may not touch; None where there is none."""
+        pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
+        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
+        return [
+            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
+            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
+        ]
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
@@ -100,13 +110,21 @@ class TouchingForces:
             "touching_points": float(len(gaps)),
         }
 
-    def trouble(self, before: Floats, /) -> Trouble | None:
-        """Diverged where a point went through the other part since the unknowns ``before`` (n,)."""
+    def settle(self) -> None:
+        """Take the present state as the start of the next step."""
         self.look()
-        for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if len(lost := one.through(before, self.seen, met)):
+        self.settled = [met for met, _ in self.now]
+
+    def trouble(self, before: Floats, /) -> Trouble | None:
+        """Diverged where a point went through the other part since the unknowns ``before`` (n,), or past its rim."""
+        self.look()
+        for one, rim, last, (met, _) in zip(self.passes, self.rims, self.settled, self.now, strict=True):
+            lost, how = one.through(before, self.seen, met), "went through the other side"
+            if rim and not len(lost):
+                lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
+            if len(lost):
                 where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
-                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} went through the other side")
+                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")
         return None
 
 

@@ -18,6 +18,8 @@ _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges: where two facets meet at an angle, Newton's method would go
 # back and forth between them.
 _STAYS = 0.05
+# Beyond a sharp edge a part faces another way: a point that slides off it there is free.
+_FACING = -0.5
 _BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
 
 
@@ -151,6 +153,15 @@ class Pass:
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
         free[near.points[near.gap <= 0]] = False
         return np.union1d(behind, self._passed(starts, ends, old, new, free))
+
+    def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
+        """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) and feel nothing:
+        those that were ``pressed`` before on a part beside it, and any at depth. Those that ``met`` a part feel it.
+        """
+        near = self.met(now, self.law.smoothing)
+        facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
+        lost = (np.isin(near.points, pressed) & facing) | (near.gap < -self.law.smoothing)
+        return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
     def _passed(self, starts: Floats, ends: Floats, old: Floats, new: Floats, free: Floats) -> Ints:
         """The ``free`` points (n,) that pass a facet on their path."""

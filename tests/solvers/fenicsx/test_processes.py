@@ -100,7 +100,9 @@ def deaf(tmp_path, monkeypatch):
     line = reported(tmp_path, Frame(1))
     started = Process([sys.executable, "-c", f"{ignore}; print({line!r}, flush=True)\nwhile True: pass"])
     yield started
-    assert started.process.returncode == -signal.SIGKILL
+    code = started.process.poll()
+    started.process.kill()  # it would run on for ever after a test that fails
+    assert code == -signal.SIGKILL
 
 
 def test_an_interrupt_kills_a_process_that_does_not_listen(deaf) -> None:

@@ -115,6 +115,24 @@ def test_nothing_passes_a_thin_sheet_within_a_step(fem_lab, face) -> None:
     assert "went through the other side" in outcome.message
 
 
+@pytest.mark.parametrize(("end", "status"), [(0.5, "diverged"), (1.0, "converged")])
+def test_a_pressed_point_that_slides_past_the_rim_of_a_part_is_no_silent_loss(end, status, fem_lab) -> None:
+    # The upper block, 0.4 mm wide, slides from x = 0.05 .. 0.45 to 0.25 .. 0.65 on a face of which the part ends at 0.5 or is all.
+    low, high = block((4, 2, 1)), placed(block((2, 1, 1), (0.4, 0.4, 0.3)), 0.05, 0.3, 0.495)
+    flat = low.facets["z1"]
+    low = replace(low, facets=low.facets | {"near": flat[low.points[flat][..., 0].max(axis=1) <= end + 1e-9]})
+    outcome = solved(fem_lab, pair(low, high, 0.2, 0.0, -0.005, law=replace(LAW, one="low_near"))).outcome
+    assert outcome.status == status
+    assert ('slid past the rim of "low_near"' in outcome.message) == (status == "diverged")
+
+
+def test_a_point_that_slides_off_a_sharp_edge_is_free(fem_lab) -> None:
+    high = placed(block((2, 1, 1), (0.4, 0.4, 0.3)), 0.5, 0.3, 0.495)
+    run = solved(fem_lab, pair(block((4, 2, 1)), high, 0.3, 0.0, -0.005))
+    assert run.outcome.status == "converged"
+    assert run.last.points[:, 0].max() > 1.1
+
+
 def test_overlap_at_rest_is_refused(fem_lab) -> None:
     outcome = solved(fem_lab, pair(block((1, 1, 1)), placed(block((1, 1, 1)), 0.0, 0.0, 0.4), 0.0, 0.0, 0.1)).outcome
     assert outcome.status == "diverged"

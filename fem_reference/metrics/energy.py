@@ -1,0 +1,22 @@
+"""Energy that a muscle stores, by all its effects, springs and contact: minus its slope in the angle is the moment about a joint.
+
+Of solvers that know it. Where nothing is dissipated it is the work of the bones, and at rest that of initial stresses.
+"""
+
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.runs.store import Run
+
+STATISTICS = {
+    "stored": Statistic(
+        "N mm", "Energy", "stored", curve="Stored energy", shown={"curve": 29, "angle": 29}, local=True, lone=True
+    )
+}
+OF, AGAINST = "surface", "reference"
+
+
+def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:  # noqa: ARG001
+    """The difference ``stored`` [N mm] from the energy of the reference; against rest, the energy itself."""
+    own, other = (one.scalars.get("energy") for one in (run, reference))
+    if own is None or (other is None and reference.solver != "rest"):
+        return ()
+    return measures("energy", {"stored": own if other is None else own - other})

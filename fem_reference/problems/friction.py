@@ -1,0 +1,46 @@
+"""Coulomb's friction of points on a surface: a point sticks to a place by a spring, and slides where that would pull too hard."""
+
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+
+
+def check(friction: float | None, place: str) -> None:
+    """Raise InputError at a ``place`` where a coefficient of friction is no number above 0; None is contact without."""
+    if friction is not None and not (isfinite(friction) and friction > 0):
+        raise InputError(place, friction, "a number above 0, or None without friction")
+
+
+class Returned(NamedTuple):
+    """Of n points: the traction over the elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
+    length of the elastic slip and ``by_limit`` (n,) by the limit of the traction.
+    """
+
+    stiffness: Floats
+    by_slip: Floats
+    by_limit: Floats
+
+
+def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
+    """The traction of a spring of ``stiffness`` k [MPa/mm] by an elastic ``slip`` s (n,) [mm], up to a ``limit`` L (n,) [MPa]:
+    ``min(k s, L)``, by return mapping (Giannakopoulos 1989, doi 10.1016/0045-7949(89)90175-4).
+
+    >>> returned(np.array([0.1, 0.3]), np.array([0.4, 0.4]), 2.0).stiffness * [0.1, 0.3]
+    array([0.2, 0.4])
+    """
+    slides = stiffness * slip > limit
+    length = np.where(slides, slip, 1.0)
+    by_slip, by_limit = np.where(slides, -limit / length**2, 0.0), np.where(slides, 1 / length, 0.0)
+    return Returned(np.where(slides, limit / length, stiffness), by_slip, by_limit)
+
+
+def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
+    """The share (n,) of a straight path that lies within contact, where the gap falls from ``before`` (n,) [mm], at ``felt`` [mm]
+    or more, to ``gap`` (n,), below that; and its derivative (n,) by the gap.
+    """
+    whole = before - gap
+    return (felt - gap) / whole, (felt - before) / whole**2

@@ -1,0 +1,87 @@
+"""Friction of bones: a block on an incline, and one under a plate that slides over it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.foundations.motion import RigidMotion
+from fem_reference.geometry.rigid_bodies import HalfSpace
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body
+from fem_reference.problems.contact import ContactBone, ContactLaw
+from fem_reference.verification.parts import clamped, control, neo_hooke
+
+FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
+WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], [MPa/mm], and height [mm]
+NEAR = (0.9, 0.99, 0.999, 1.001, 1.01)  # tangents of the requested angles, over the friction
+CONTACT = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
+
+
+def incline(lab: Lab, friction: float) -> Finding:
+    """The greatest tangent among those requested at which a block still sticks to a plane that turns below it under its weight."""
+    angles = tuple(float(np.arctan(share * FRICTION)) for share in NEAR)
+    frames = (0.0, *(float(i) for i in range(1, 1 + len(NEAR))))
+    turning = RigidMotion((0.0, 1.0, 0.0), (0.5, 0.5, 0.0), frames, (0.0, *angles))
+    plane = ContactBone("plane", HalfSpace((0.0, 0.0, WEIGHT / STIFFNESS), (0.0, 0.0, 1.0)), turning.pose)
+    at_once = [{"frame": 0.0, "amount": 1.0}]
+    weight = make("gravity", density=WEIGHT / HEIGHT / 1e4, acceleration=[0.0, 0.0, -1e4], ramp=at_once)
+    mesh = shapes.box((2, 2, 1), (1.0, 1.0, HEIGHT), "hexahedron")
+    body = Body(
+        mesh, (*neo_hooke(MU, BULK), weight), (), frames, contact=replace(CONTACT, friction=friction), bones=(plane,)
+    )
+    run = lab.solve(body, "Q1/P0", first_step=0.1, residual=1e-12, smallest_step=1e-3)
+    reached = run.states[-1]
+    work = reached.scalars["friction_work"]
+    return Finding(float(np.tan((0.0, *angles)[round(reached.number)])), note=f"{work:.2g} N mm are lost until then")
+
+
+def drag(lab: Lab, friction: float) -> Finding:
+    """The drag of a plate that slides over a clamped block, over its normal force."""
+    above = ContactBone(
+        "plate",
+        HalfSpace((0.0, 0.0, HEIGHT - 0.005), (0.0, 0.0, -1.0)),
+        RigidMotion((1.0, 0.0, 0.0), None, (0.0, 1.0), (0.0, 0.2)).pose,
+    )
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, HEIGHT), "tetrahedron")
+    law = ContactLaw("z1", 1.0, 0.01, friction=friction)
+    body = Body(mesh, neo_hooke(MU, BULK), clamped("z0"), (0.0, 0.5, 1.0), contact=law, bones=(above,))
+    state = lab.solve(body, "P2/P1", first_step=0.25, residual=1e-12).last
+    along, _, across = state.forces["plate"]
+    lost = state.scalars["friction_work"]
+    return Finding(float(along / -across), note=f"{lost:.2g} N mm are lost")
+
+
+ENTRIES = (
+    Entry(
+        name="incline",
+        group="contact",
+        title="A block on a plane that turns below it: the steepest at which it sticks",
+        unit="",
+        measure=incline,
+        given={"friction": FRICTION},
+        **control("friction 2 % greater", friction=1.02 * FRICTION),
+        truth=FRICTION,
+        within=1.5e-3,
+        relative=True,
+        because="angles are requested at 0.1 % below and above the friction: it must stick at the first and be lost at the second",
+        kind="closed form",
+        source="Coulomb: the tangent of the angle is the coefficient of friction",
+    ),
+    Entry(
+        name="sliding_plate",
+        group="contact",
+        title="A plate that slides over a block: its drag over its normal force",
+        unit="",
+        measure=drag,
+        given={"friction": FRICTION},
+        **control("friction 1 % greater", friction=1.01 * FRICTION),
+        truth=FRICTION,
+        within=1e-7,
+        relative=True,
+        because="each point that slides has its limit to rounding: what is left is the residual of 1e-12 N over forces of 1e-4 N",
+        kind="closed form",
+        source="Coulomb: a drag of the friction times the normal force",
+    ),
+)
