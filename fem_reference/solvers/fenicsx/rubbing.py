@@ -107,7 +107,11 @@ class Rubbing:
         turned = np.einsum("nabr,nb->nar", place.turn, elastic)
         rates = np.einsum("na,nar->nr", covector, change) + np.einsum("na,nar->nr", elastic, turned) / 2
         rates /= np.maximum(size, np.finfo(float).tiny)[:, None]
-        (pressure, by_gap), friction, areas = self.one.pressure(met), self.law.friction or 0.0, self.one.areas[met.points]
+        (pressure, by_gap), friction, areas = (
+            self.one.pressure(met),
+            self.law.friction or 0.0,
+            self.one.areas[met.points],
+        )
         found = returned(size, friction * pressure, self.law.stiffness)
         rates = found.by_slip[:, None] * rates
         rates[:, :3] += (found.by_limit * friction * by_gap)[:, None] * met.there.normal
