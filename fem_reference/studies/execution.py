@@ -1,7 +1,7 @@
 """The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
