@@ -1,14 +1,18 @@
-"""A Hill-type muscle at rest: a contractile and a parallel element at an angle, in series with a tendon (report 5.1, Figure 5.1).
+"""A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
 
-Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0. The curves are those of Thelen (2003,
-doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``; the structure is Zajac's (1989).
+Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0; velocities of shortening are positive,
+as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
+the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's: its constants follow from a / F0 and the greatest velocity,
+``b = a / F0 vmax``. Unlike in Thelen's model, activation leaves the greatest velocity as it is.
 """
 
 import math
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fem_reference.foundations.errors import InputError
@@ -17,28 +21,32 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Angle, Force, PositiveLength
 
 # Thelen 2003, young adults: width of the active curve; shape of the passive one and its strain at F0; the strain of the tendon at
-# F0.
-_WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN = 0.45, 5.0, 0.6, 0.04
+# F0; the greatest force of lengthening.
+_WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
 # The tendon's toe ends at this share of F0, with this shape, at a strain from where a line of the same slope leads on (same place).
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
-# Fibres are sought between these lengths in steps of at most this.
+# Fibres are sought between these lengths in steps of at most this; velocities are found to this share of F0.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
 _SLACK = 1e-9  # strain, below which round-off does not strain a tendon
+_LEAST = 1e-3  # activation, without which no velocity follows from a force
 
 
 class Hill(Record):
     """A muscle and its tendon.
 
     ``max_force``: F0, isometric [N]; ``optimal_length``: l0 of the fibres [mm]; ``slack_length``: of the tendon [mm];
-    ``pennation``: the angle of fibres at their optimal length [rad].
+    ``pennation``: the angle of fibres at their optimal length [rad]; ``max_velocity``: of shortening without load [l0 / s];
+    ``curvature``: a / F0 of (5.1).
     """
 
     max_force: Force
     optimal_length: PositiveLength
     slack_length: PositiveLength
     pennation: Annotated[Angle, Field(ge=0, lt=1.2)] = 0.0
+    max_velocity: Annotated[float, Field(gt=0)] = 10.0
+    curvature: Annotated[float, Field(gt=0, le=1)] = 0.25
 
     @property
     def thickness(self) -> float:
@@ -81,6 +89,31 @@ class Hill(Record):
         """The fibre length [l0] at a ``strain`` of the tendon."""
         along = (path - self.slack_length * (1 + strain)) / self.optimal_length
         return math.hypot(max(along, 0.0), self.thickness)
+
+    def velocity(self, path: float, fibre: float, activation: float) -> float:
+        """The velocity of shortening [l0 / s] of fibres whose force is in equilibrium with the tendon's."""
+        cosine = max(self.cosine(fibre), 1e-6)
+        force = (self.tendon_force(path, fibre) / cosine - passive(fibre)) / (max(activation, _LEAST) * active(fibre))
+        return self.max_velocity * inverse_hyperbola(force, self.curvature)
+
+    def follow(
+        self, times: Floats, paths: Floats, activations: Floats, tolerance: float = 1e-9
+    ) -> tuple[Floats, Floats]:
+        """Forces (n,) [N] and fibre lengths (n,) [l0] at ``times`` (n,) [s], from equilibrium at the first; ``paths`` (n,) [mm] and
+        ``activations`` (n,) are linear in between.
+        """
+        _, first = self.static(float(paths[0]), float(activations[0]))
+
+        def rate(time: float, fibre: Floats) -> list[float]:
+            path, activation = (float(np.interp(time, times, values)) for values in (paths, activations))
+            return [-self.velocity(path, float(fibre[0]), activation)]
+
+        lengths = [first]
+        for start, end in pairwise(times):  # each with its own slopes
+            found = solve_ivp(rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance)
+            lengths.append(float(found.y[0, -1]))
+        shares = [self.tendon_force(float(path), one) for path, one in zip(paths, lengths, strict=True)]
+        return self.max_force * np.array(shares), np.array(lengths)
 
 
 class HillSettings(Record):
@@ -131,3 +164,29 @@ def tendon(strain: float) -> float:
 def _strain(force: float) -> float:
     """The strain of the tendon at a ``force`` [F0] beyond its toe."""
     return _TOE_STRAIN + (force - _TOE) / (1 - _TOE) * (_TENDON_STRAIN - _TOE_STRAIN)
+
+
+def hyperbola(velocity: float, curvature: float) -> float:
+    """The force, as a share of the isometric one, at a ``velocity`` of shortening as a share of the greatest: (5.1) solved for F.
+
+    Lengthening (negative) it rises to 1.4 by a hyperbola that is twice as steep at 0 (Thelen 2003).
+    """
+    if velocity >= 0:
+        return (1 - velocity) / (1 + velocity / curvature)
+    rise = _LENGTHENING - 1
+    slope = 2 * (1 + 1 / curvature)
+    return 1 + rise * slope * -velocity / (rise + slope * -velocity)
+
+
+def inverse_hyperbola(force: float, curvature: float) -> float:
+    """The velocity of shortening, as a share of the greatest, at a ``force``; beyond the hyperbola's ends along its tangents."""
+    slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
+    if force < 0:  # shortens faster than without load
+        return 1 - force * (1 + 1 / curvature)
+    if force <= 1:
+        return (1 - force) / (1 + force / curvature)
+    most = 1 + 0.95 * rise
+    inner = min(force, most)
+    found = -rise * (inner - 1) / (slope * (rise - (inner - 1)))
+    steep = rise**2 / (slope * (rise - (most - 1)) ** 2)
+    return found - steep * max(force - most, 0.0)

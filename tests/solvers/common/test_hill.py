@@ -1,9 +1,10 @@
-"""A muscle of Hill's type: its curves, and equilibrium with its tendon."""
+"""Hill's muscle: his hyperbola, equilibrium, and ramps against an ODE in another unknown."""
 
 import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fem_reference.foundations.errors import InputError
@@ -15,6 +16,40 @@ from fem_reference.solvers.common.hill import Hill
 def muscle(**changes) -> Hill:
     usual = {"max_force": "1000 N", "optimal_length": "60 mm", "slack_length": "120 mm"}
     return parse(Hill, usual | changes, "hill")
+
+
+@pytest.mark.parametrize("curvature", [0.15, 0.25, 0.4])
+def test_shortening_is_the_hyperbola_of_the_report(curvature: float) -> None:
+    """(5.1): (F + a) v = b (F0 - F), with a = curvature F0 and b = curvature vmax; F0 at rest, 0 at the greatest velocity."""
+    for velocity in np.linspace(0, 1, 11):
+        force = hill.hyperbola(velocity, curvature)
+        assert (force + curvature) * velocity == pytest.approx(curvature * (1 - force), abs=1e-14)
+        assert (force + curvature) * (velocity + curvature) == pytest.approx((1 + curvature) * curvature)  # (5.2)
+    assert (hill.hyperbola(0, curvature), hill.hyperbola(1, curvature)) == (1, 0)
+
+
+def test_the_wrong_constant_misses_the_hyperbola() -> None:
+    """The negative control: another a / F0 than that of the muscle."""
+    force = hill.hyperbola(0.3, 0.25)
+    assert abs((force + 0.3) * 0.3 - 0.3 * (1 - force)) > 0.01
+
+
+def test_lengthening_is_twice_as_steep_as_shortening_and_has_a_greatest_force() -> None:
+    """Thelen 2003: V = Vmax (F - 1) / b with b = (2 + 2 / Af) (1.4 - F) / 0.4, at full activation and optimal length."""
+    step = 1e-6
+    slopes = [(hill.hyperbola(side * step, 0.25) - 1) / (side * step) for side in (-1, 1)]
+    assert slopes[1] == pytest.approx(-(1 + 1 / 0.25), rel=1e-4)  # the hyperbola's own slope at rest
+    assert slopes[0] == pytest.approx(2 * slopes[1], rel=1e-4)
+    for force in (1.1, 1.2, 1.3):
+        assert -hill.inverse_hyperbola(force, 0.25) == pytest.approx(
+            (force - 1) / ((2 + 2 / 0.25) * (1.4 - force) / 0.4)
+        )
+    assert hill.hyperbola(-1e6, 0.25) == pytest.approx(1.4, rel=1e-5)
+
+
+@pytest.mark.parametrize("velocity", [-0.5, -0.3, 0.0, 0.2, 0.9])
+def test_velocity_follows_from_force(velocity: float) -> None:
+    assert hill.inverse_hyperbola(hill.hyperbola(velocity, 0.25), 0.25) == pytest.approx(velocity, rel=1e-9, abs=1e-12)
 
 
 def test_curves_pass_their_published_points() -> None:
@@ -52,3 +87,39 @@ def test_a_static_state_balances_and_slack_pulls_nothing() -> None:
     assert given.static(100.0, 1.0)[0] == 0
     with pytest.raises(InputError, match="a tenth of their optimal length"):
         muscle(slack_length="1 mm").static(7.005, 1.0)
+
+
+@pytest.mark.parametrize(
+    "amounts", [(180.0, 186.0), (186.0, 178.0), (182.0, 182.0)], ids=["stretched", "released", "isometric"]
+)
+def test_a_ramp_is_that_of_an_ode_for_the_force(amounts: tuple[float, float]) -> None:
+    """The same with the strain of the tendon as unknown, by another method: its rate is (path rate + fibre velocity) / slack."""
+    given = muscle()
+    times = np.linspace(0, 0.3, 16)
+    paths, activations = np.linspace(*amounts, 16), np.linspace(0.2, 0.8, 16)
+    forces, _ = given.follow(times, paths, activations)
+
+    def rate(time: float, strain: np.ndarray) -> list[float]:
+        path, activation = np.interp(time, times, paths), np.interp(time, times, activations)
+        fibre = (path - 120 * (1 + strain[0])) / 60
+        force = (hill.tendon(strain[0]) - hill.passive(fibre)) / (activation * hill.active(fibre))
+        shortening = 10 * hill.inverse_hyperbola(force, 0.25)
+        return [((paths[-1] - paths[0]) / 0.3 + 60 * shortening) / 120]
+
+    _, fibre = given.static(amounts[0], 0.2)
+    first = (amounts[0] - 60 * fibre) / 120 - 1
+    other = solve_ivp(rate, (0, 0.3), [first], method="Radau", t_eval=times, rtol=1e-10, atol=1e-12, max_step=0.002)
+    np.testing.assert_allclose(forces, [1000 * hill.tendon(strain) for strain in other.y[0]], rtol=1e-6, atol=1e-3)
+
+
+def test_an_isotonic_contraction_shortens_by_the_hyperbola() -> None:
+    """A stiff tendon that yields by the path's own velocity carries the force of (5.1): the path shortens at 0.3 vmax."""
+    given = muscle(slack_length="1 mm", max_velocity=5.0)
+    times = np.linspace(0, 0.05, 6)
+    speed = 0.3 * 5 * 60
+    start = 60 * 1.05 + 1.02
+    forces, fibres = given.follow(times, start - speed * times, np.ones(6))
+    wanted = [1000 * hill.active(one) * hill.hyperbola(0.3, 0.25) for one in fibres[2:]]
+    np.testing.assert_allclose(
+        forces[2:], np.array(wanted) + [1000 * hill.passive(one) for one in fibres[2:]], rtol=0.01
+    )
