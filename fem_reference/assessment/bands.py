@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from fem_reference.assessment import chaos, gaussian_process
 from fem_reference.assessment.chaos import Chaos
@@ -48,6 +47,8 @@ class Design:
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
     """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable once in each of so many equal parts of its range."""
+    from scipy.stats import qmc  # half a second
+
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 
 
@@ -115,6 +116,8 @@ def _filled(band: Band, defined: Floats, found: Floats) -> Band:
 
 def _samples(design: Design) -> Floats:
     """Points at which a surrogate is asked."""
+    from scipy.stats import qmc
+
     return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)
 
 
