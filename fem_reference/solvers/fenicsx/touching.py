@@ -42,9 +42,25 @@ class TouchingForces:
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
         ]
-        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching)]:
-            if depth > law.smoothing:
+        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching if not law.relaxed)]:
+            if depth > law.smoothing and not law.relaxed:
                 raise ArithmeticError(f'"{law.one}" and "{law.other}" overlap by {depth:.3g} mm')
+        self.overlap = max((depth for _, depth in depths), default=0.0)
+        for one, (met, _) in zip(self.passes, self.now, strict=True):
+            if one.law.relaxed:
+                one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
+        self.move_to(body.frames[0])
+
+    def move_to(self, frame: float) -> None:
+        """Subtract what is left at ``frame`` of overlaps at rest."""
+        for one in self.passes:
+            if (share := one.law.allowance(frame)) != one.share:
+                one.share = share
+                self.seen[:] = np.nan
+
+    def acting(self) -> list[float]:
+        """The shares of overlaps at rest that are subtracted."""
+        return [one.share for one in self.passes]
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
         """The skin around the other part, by pass, that its points may not touch; None where there is none."""
@@ -113,18 +129,22 @@ class TouchingForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
-        ``touching_area`` [mm2], the mean of both sides; and the number of points under pressure, ``touching_points``. With
-        friction its dissipated work since the start, ``touching_friction_work`` [N mm].
+        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
+        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction the work that it has
+        dissipated since the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
+        removed = any(one.law.relaxed for one in self.passes)
         gaps = np.concatenate([met.gap for met, _ in self.now])
-        return {
+        found = {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
-            "touching_pressure": max(float(one.law.pressure(met.gap)[0].max(initial=0.0)) for one, (met, _) in pairs),
+            "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
-        } | ({"touching_friction_work": self.dissipated} if any(self.rubbing) else {})
+        }
+        found |= {"touching_overlap_at_rest": self.overlap} if removed else {}
+        return found | ({"touching_friction_work": self.dissipated} if any(self.rubbing) else {})
 
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
