@@ -130,21 +130,21 @@ class TouchingForces:
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
         ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
-        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction the work that it has
-        dissipated since the start, ``touching_friction_work`` [N mm].
+        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
+        the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
         removed = any(one.law.relaxed for one in self.passes)
         gaps = np.concatenate([met.gap for met, _ in self.now])
-        found = {
+        more = {"touching_overlap_at_rest": self.overlap} if removed else {}
+        more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
+        return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
             "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
-        }
-        found |= {"touching_overlap_at_rest": self.overlap} if removed else {}
-        return found | ({"touching_friction_work": self.dissipated} if any(self.rubbing) else {})
+        } | more
 
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
