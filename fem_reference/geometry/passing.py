@@ -58,6 +58,6 @@ def seen_along(points: Floats, directions: Floats, triangles: Floats) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
             scale = 1 / np.vecdot(one, across)
             u, v, far = np.vecdot(away, across) * scale, turn @ direction * scale, np.vecdot(other, turn) * scale
-        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0) & (out @ direction > 0)
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0) & (out @ direction > 0)
         found[i] = far[hit].min(initial=np.inf)
     return found

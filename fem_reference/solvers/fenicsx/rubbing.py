@@ -157,7 +157,8 @@ class Rubbing:
         before = np.vecdot(places - found.point, found.normal)
         entered = ~held & (before > self.law.smoothing)
         new = moved[entered]
-        share[new], by_gap[new] = since_entry(met.gap[new], before[entered], self.law.smoothing)
+        left = self.one.share * self.one.overlaps[met.points[new]]
+        share[new], by_gap[new] = since_entry(met.gap[new] + left, before[entered] + left, self.law.smoothing)
         return at, share, by_gap
 
     def _rows(self, met: Met, tables: Floats) -> tuple[Ints, Floats]:
