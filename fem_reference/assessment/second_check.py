@@ -5,16 +5,20 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from fem_reference.assessment import run_checks
-from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
+from fem_reference.assessment import neighbours, run_checks
+from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.io.texts import plain
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.contents import amend
 from fem_reference.runs.store import Frame, Outcome, Run, collected
+from fem_reference.runs.views import run_of
 from fem_reference.runs.writer import places
 
 log = logging.getLogger(__name__)
@@ -31,13 +35,13 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
     return replace(outcome, status="denied", message=f"denied by the second check: {lost[0]}; {outcome.message}")
 
 
-def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
+def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> Run:
     """A converged ``run`` with its second check in the origin, stored with it; unchanged where it has the check of this code."""
     stored, code = run.origin.get(RECORD, {}), hashlib.sha256(Path(run_checks.__file__).read_bytes()).hexdigest()[:16]
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
-    checks = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
+    checks = _of_all(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
     outcome = confirmed(replace(run.outcome, status="converged", message=message), checks)
     facts = [plain(one) | {"met": one.met} for one in checks]
     seconds = time.process_time() - begin
@@ -46,6 +50,23 @@ def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
         amend(run.folder, status=outcome.status, message=outcome.message, origin=origin)
     log.info("%s: second check: %s", run.name, "passed" if outcome.status == "converged" else outcome.message)
     return replace(run, outcome=outcome, origin=origin)
+
+
+def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
+    """The checks of a ``run`` of a muscle; of several, those of each with its name, and that none is in another."""
+    if isinstance(problem, MuscleProblem):
+        return of_muscle(problem, run, nodes)
+    found = list[RunCheck]()
+    for span in problem.spans:
+        part = problem.problems[span.name]
+        own = partial(_some, nodes, span.points)
+        checks = of_muscle(part, run_of(run, problem, span.name), own)
+        found += [replace(one, name=f"{span.name}: {one.name}") for one in checks]
+    return (*found, *neighbours.between(problem, run, nodes))
+
+
+def _some(nodes: Nodes, points: slice, number: int) -> Floats | None:
+    return None if (found := nodes(number)) is None else found[points]
 
 
 def confirmed_frames(problem: MuscleProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:

@@ -20,7 +20,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import COMMAND, HOME, Candidate, Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import judging, refinement
+from fem_reference.studies import by_muscle, judging, refinement
 from fem_reference.studies.execution import Bench
 
 
@@ -35,7 +35,7 @@ def scene_of(options: argparse.Namespace) -> Case:
     case = of_case.chosen(read)
     units = metrics.units(against=case.standards("candidates"))
     asked = (_expectation(text, units) for text in options.limit)
-    return case.model_copy(update={"expect": (*case.expect, *asked)})
+    return case.expecting(tuple(asked))
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
@@ -116,7 +116,8 @@ def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[t
     if options.error_bar:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
-    judge.check(scene)
+    for one in scene.parts or (scene,):
+        judge.check(one)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     bench.check(chosen)
     return bench
@@ -165,14 +166,39 @@ def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[C
 
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
+    bench = checked_bench(case, options, chosen)
+    if case.parts:
+        return _compared_muscles(bench, options, chosen)
     with fenicsx.shared():
-        result = judged(checked_bench(case, options, chosen), options, chosen)
+        result = judged(bench, options, chosen)
     alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     wanted = asked("run" if alone else "compare", case, options, "report", *who)
     text = "\n".join([comparison_text(result), *unturned(options, result.word)])
     publish(options, wanted, report.of_comparison(result), report.summary(result), text)
     return status([result])
+
+
+def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Measure and judge each of several muscles, and write a page for each."""
+    with fenicsx.shared():
+        found = by_muscle.compared(bench, chosen)
+    case, who = bench.scene, candidates(bench.scene, [entry for entry, _ in chosen])
+    texts, pages, facts = list[str](), list[str](), dict[str, Any]({"case": case.name, "muscles": {}})
+    for name, result in found.muscles.items():
+        texts.append(f"{name}:\n{comparison_text(result)}")
+        facts["muscles"][name] = report.summary(result)
+    facts["penetration"], word = found.penetration, judge.overall(result.word for result in found.muscles.values())
+    texts += [
+        f"{who}: {one} and {other} in each other by {depth:.3g} mm (frame {frame})"
+        for who, one, other, depth, frame in found.worst
+    ]
+    write_output(facts, "\n".join([*texts, by_muscle.ALONE, *unturned(options, word)]), options)
+    for name, result in found.muscles.items():
+        wanted = asked("compare", case, options, f"report_{name}", *who)
+        pages += written(wanted, report.of_comparison(result), out(options), options.page_name)[1]
+    print(*pages, sep="\n")
+    return status(found.muscles.values())
 
 
 def unturned(options: argparse.Namespace, word: str) -> list[str]:

@@ -44,3 +44,20 @@ def _is_inside(point: Floats, triangle: Floats) -> bool:
     across = normals(triangle)[0]
     arms = triangle[0] - point
     return bool((np.cross(arms, np.roll(arms, -1, axis=0)) @ across >= 0).all())
+
+
+def seen_along(points: Floats, directions: Floats, triangles: Floats) -> Floats:
+    """The distance (n,) [mm] from ``points`` (n, 3) along unit vectors ``directions`` (n, 3) to the first of the ``triangles``
+    (t, 3, 3) whose back is towards them, infinite where there is none (Moeller and Trumbore 1997).
+    """
+    first, one, other = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    out, found = np.cross(one, other), np.full(len(points), np.inf)
+    for i, (point, direction) in enumerate(zip(points, directions, strict=True)):
+        across, away = np.cross(direction, other), point - first
+        turn = np.cross(away, one)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = 1 / np.vecdot(one, across)
+            u, v, far = np.vecdot(away, across) * scale, turn @ direction * scale, np.vecdot(other, turn) * scale
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0) & (out @ direction > 0)
+        found[i] = far[hit].min(initial=np.inf)
+    return found

@@ -176,6 +176,7 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if reference.fibres is None:
         place = f"{reference.name}: fibres"
         raise InputError(place, "a run without an interior", "a reference that carries the fibres")
+    assert isinstance(setup, Setup)  # of one muscle: those of several are measured each by itself
     context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
     return replace(context, ends=attached_ends(setup.attached, context.exempt, reference.fibres))
 

@@ -187,7 +187,8 @@ class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
     ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
     frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at
-    ``frames[0]``, where the body does not start at rest; ``regions``: by name those in which effects act.
+    ``frames[0]``, where the body does not start at rest; ``regions``: by name those in which effects act, of which some lie
+    ``within`` a range of cells, the first and the one after the last: those of one of several pieces.
     """
 
     mesh: Cells
@@ -201,6 +202,7 @@ class Body:
     start: Callable[[Floats], Floats] | None = None
     regions: Mapping[str, Region] = field(default_factory=dict)
     touching: tuple[Touching, ...] = ()
+    within: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     task: ClassVar[Task] = "solve_body"
     rest: ClassVar[AtRest] = NOTHING
@@ -208,22 +210,32 @@ class Body:
     @property
     def first(self) -> float:
         """The first requested frame: an overlap at rest is relaxed before it."""
-        relaxed = self.contact.relaxed if self.contact else None
-        return self.frames[0] if relaxed is None else relaxed[1]
+        relaxed = [law.relaxed for law in self.touching] + ([self.contact.relaxed] if self.contact else [])
+        return next((frames[1] for frames in relaxed if frames is not None), self.frames[0])
 
     @property
     def rubs(self) -> bool:
         """True with friction, where a state depends on the path to it."""
-        return self.contact is not None and self.contact.friction is not None
+        return any(one is not None for one in self.frictions)
+
+    @property
+    def frictions(self) -> list[float | None]:
+        """The coefficients of friction of contact and of each pair of touching parts, None without."""
+        own = [self.contact.friction] if self.contact else []
+        return [*own, *(law.friction for law in self.touching)]
 
     @property
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
         return diagonal(self.mesh.points)
 
-    def shares(self, points: Floats) -> dict[str, Floats]:
-        """The shares (n,) of rest ``points`` (n, 3) [mm] in each region that an effect names."""
-        return {name: self.regions[name](points) for name in regions_named(self.effects)}
+    def shares(self, points: Floats, cells: Ints) -> dict[str, Floats]:
+        """The shares (n,) of rest ``points`` (n, 3) [mm] in ``cells`` (n,) in each region that an effect names."""
+        found = {name: self.regions[name](points) for name in regions_named(self.effects)}
+        for name in set(found) & set(self.within):
+            first, last = self.within[name]
+            found[name] = np.where((cells >= first) & (cells < last), found[name], 0.0)
+        return found
 
     def points_on(self, on: str | Skin) -> Floats:
         """The corners (n, 3) [mm] of the facets of a region, or the points of a skin, at rest."""

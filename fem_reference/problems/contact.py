@@ -48,6 +48,9 @@ class ContactLaw:
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
     k, and slides under the friction times the pressure.
+
+    ``parts``: of several bodies solved as one, the name of each, its first point of the skin, and the one after its last: forces
+    are then reported by body too.
     """
 
     on: str | Skin
@@ -56,6 +59,7 @@ class ContactLaw:
     relaxed: tuple[float, float] | None = None
     in_situ: float | None = None
     friction: float | None = None
+    parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
@@ -70,8 +74,13 @@ class ContactLaw:
         """The share of the overlap at rest that is subtracted at ``frame``."""
         if self.relaxed is None:
             return float(self.in_situ is not None)
-        first, last = self.relaxed
-        return float(np.clip((last - frame) / (last - first), 0, 1))
+        return remaining(self.relaxed, frame)
+
+
+def remaining(relaxed: tuple[float, float], frame: float) -> float:
+    """The share of an overlap at rest that is left at ``frame``, as it is removed between two frame numbers."""
+    first, last = relaxed
+    return float(np.clip((last - frame) / (last - first), 0, 1))
 
 
 def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:

@@ -10,29 +10,34 @@ from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.problems import muscle, regions, scalar
+from fem_reference.problems import muscle, muscles, regions, scalar
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem, MusclesSetup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.stresses import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
 
 # A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
-CaseSetup = Setup | FieldProblem
-CaseProblem = MuscleProblem | FieldProblem
+CaseSetup = Setup | MusclesSetup | FieldProblem
+CaseProblem = MuscleProblem | MusclesProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
     """Decisions on which effects a case needs, and why, from the set-up that ``rest`` gives, or a new one; none of a field."""
-    if not isinstance(case, MuscleCase):
+    if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
+    if isinstance(case, MusclesCase):
+        assert isinstance(known, MusclesSetup)
+        return muscles.explained(case, known)
     assert isinstance(known, Setup)  # of a muscle
     return decisions(case, known)
 
@@ -41,6 +46,14 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
     """Facts on the contents of a case, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return _facts_of_muscle(setup, case)
+    if isinstance(case, MusclesCase) and isinstance(setup, MusclesSetup):
+        own = zip(case.parts, setup.muscles.items(), strict=True)
+        pairs = [" and ".join(pair) for pair in setup.pairs]
+        known = {name: _facts_of_muscle(rest, part) for part, (name, rest) in own}
+        return {
+            **known,
+            "may touch": ", ".join(pairs) or ("no two" if case.touching else "no two, without the effect touching"),
+        }
     assert isinstance(setup, FieldProblem)  # there are no other types
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
     return {
@@ -106,6 +119,9 @@ def _motion(motion: RigidMotion | None) -> str:
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
     """The effect of the bones' motion on a muscle, its regions, and why it needs its effects, in words; nothing of a field."""
+    if isinstance(case, MusclesCase):
+        every = case.decisions or explained(case, lambda: setup)
+        return {"effects": {one.effect.title: str(one).partition(": ")[2] for one in every}}
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)
@@ -117,11 +133,13 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
     """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``."""
-    if not isinstance(case, MuscleCase) or case.choice == "listed":
+    if not isinstance(case, MuscleCase | MusclesCase) or case.choice == "listed":
         return case
     found = explained(case, rest)
     for one in found:
         log.info("%s: %s", case.name, one)
+    if isinstance(case, MusclesCase):
+        return muscles.needed(case, found)  # type: ignore[return-value]  # of the type of the case
     kept = tuple(one.effect for one in found if one.needed)
     return case.model_copy(update={"choice": "listed", "effect": kept, "decisions": found})
 
@@ -153,11 +171,16 @@ def scalar_case(case: Case) -> ScalarCase:
 
 def setup(case: Case) -> CaseSetup:
     """The set-up of a case. InputError names what is unusable."""
+    if isinstance(case, MusclesCase):
+        return muscles.setup(case)
     return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))
 
 
 def problem(case: Case, rest: CaseSetup) -> CaseProblem:
     """The problem of a case, made of its set-up ``rest``: a muscle is filled with tetrahedra."""
+    if isinstance(case, MusclesCase):
+        assert isinstance(rest, MusclesSetup)
+        return muscles.build(case, rest)
     if not isinstance(case, MuscleCase):
         assert isinstance(rest, FieldProblem)
         return rest

@@ -87,8 +87,9 @@ def check(body: Body) -> None:
             raise InputError(f"effects[{i}].in", f'"{region}"', want)
     if not named:
         return
-    points = np.concatenate(list(body.mesh.places()))
-    at = State(F=(), regions=body.shares(points))
+    places = list(body.mesh.places())
+    points = np.concatenate(places)
+    at = State(F=(), regions=body.shares(points, np.tile(np.arange(len(places[0])), len(places))))
     for i, region in named.items():
         share = at.share(region)
         if not (share.min() >= 0 and share.max() <= 1):
@@ -96,7 +97,8 @@ def check(body: Body) -> None:
         if (
             isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets
         ):  # membranes know shares at corners
-            share = State(F=(), regions=body.shares(body.points_on(effect.on))).share(region)
+            corners = body.points_on(effect.on)
+            share = State(F=(), regions=body.shares(corners, np.zeros(len(corners), int))).share(region)
         if (most := float(share.max(initial=0.0))) < _REACHED:
             got = f"whose share is {most:.2g} at most" if most else "which is nowhere in the body"
             want = f"a share of {_REACHED:g} somewhere: more depth, or less width"

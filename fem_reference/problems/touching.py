@@ -8,25 +8,33 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, connected_parts
-from fem_reference.problems.contact import penalty
+from fem_reference.problems.contact import penalty, remaining
 
 
 @dataclass(frozen=True)
 class Touching:
-    """Frictionless contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
+    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
     facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
+    ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
+    an overlap at rest is removed, as that with bones is.
     """
 
     one: str
     other: str
     stiffness: float
     smoothing: float
+    friction: float | None = None
+    relaxed: tuple[float, float] | None = None
 
     @property
     def forces(self) -> tuple[str, str]:
         """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
         return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
+
+    def allowance(self, frame: float) -> float:
+        """The share of the overlap at rest that is subtracted at ``frame``."""
+        return 0.0 if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""

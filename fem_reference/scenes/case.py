@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Field
 
@@ -119,6 +119,15 @@ class Case(Record):
         return self.effect
 
     @property
+    def parts(self) -> "tuple[Case, ...]":
+        """The muscles of a case of several, each as a case of its own; nothing else has any."""
+        return ()
+
+    def expecting(self, more: tuple[Expectation, ...]) -> Self:
+        """The case that expects ``more``."""
+        return self.model_copy(update={"expect": (*self.expect, *more)})
+
+    @property
     def acting(self) -> dict[str, Any]:
         """The effects by their names, distinct in this case."""
         return {type(effect).__name__: effect for effect in self.effects}
@@ -201,12 +210,16 @@ class Case(Record):
         ]
         return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
+    def determining(self) -> dict[str, Any]:
+        """The keys that determine its solution, besides the effects."""
+        return self.model_dump(mode="json", include=set(self.determined_by))
+
     @property
     def key(self) -> str:
         """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
         the files that they name (not where these are) and that effects from outside the package are.
         """
-        tables = self.model_dump(mode="json", include=set(self.determined_by))
+        tables = self.determining()
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
         digest = hashlib.sha256(json.dumps(_unnamed(tables, self.naming_files), sort_keys=True).encode())
         for key, text in _files(tables, self.naming_files):

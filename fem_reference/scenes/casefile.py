@@ -5,23 +5,18 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from fem_reference.effects import Effect, FieldEffect, Ramped, in_situ, moduli, name_of, region_of
+from fem_reference.effects import Effect, FieldEffect, Interaction, in_situ, moduli, name_of, region_of
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
-from fem_reference.effects.contact import Contact, among
-from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, check_once, check_used, join, keys, parse
 from fem_reference.io import texts
-from fem_reference.scenes import numbers, ranges, regions
+from fem_reference.scenes import numbers, ranges
 from fem_reference.scenes.case import HOME, Case
-from fem_reference.scenes.muscle import Frames, MuscleCase
+from fem_reference.scenes.consistency import check_acting, check_names, check_rest
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase, alone
 from fem_reference.scenes.scalar import ScalarCase
-
-# What a load acts on, where it is no attachment: the surface that is not attached to bone.
-FREE = "free"
 
 
 def cases() -> list[str]:
@@ -120,7 +115,8 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
     """The ``case`` itself, where it is one of a muscle; else InputError at ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
-        raise InputError(place or case.place, f'"{case.name}", a scalar case', "the case of a muscle")
+        kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
+        raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")
     return case
 
 
@@ -163,7 +159,12 @@ def _scene(table: dict[str, Any], path: Path) -> Case:
 def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     """The case with the keys of ``table`` and the ``name``, ``folder`` and ``place`` of ``whose``."""
     place = str(whose["place"])
+    table = alone(table, place)
+    record: type[Case]
+    kind: type[Record]
     record, kind = (ScalarCase, FieldEffect) if "domain" in table else (MuscleCase, Effect)
+    if isinstance(table.get("muscle"), list):
+        record, table = MusclesCase, table | {"muscle": _muscles(table["muscle"], place)}
     for key in whose:
         if key in table:
             raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
@@ -177,6 +178,16 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     return _checked(case)
 
 
+def _muscles(entries: list[Any], place: str) -> list[Any]:
+    """The muscles that are written below the key ``muscle``, with the effects of each as records."""
+    return [
+        entry | {"effect": effects(entry["effect"], join(place, f"muscle[{i}]"))}
+        if isinstance(entry, dict) and "effect" in entry
+        else entry
+        for i, entry in enumerate(entries)
+    ]
+
+
 def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
     """The ``case`` with other numbers by key, in their units inside, checked as one of a file."""
     made = numbers.changed(case, values)
@@ -185,9 +196,11 @@ def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
 
 
 def _checked[C: Case](case: C) -> C:
+    if isinstance(case, MusclesCase):
+        _check_muscles(case)
     if isinstance(case, MuscleCase):
-        _check_names(case)
-        _check_rest(case)
+        check_names(case)
+        check_rest(case)
         ranges.check(case)
     return case
 
@@ -228,66 +241,25 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
     return parse(find_effect(table["name"]), {key: value for key, value in table.items() if key != "name"}, place)
 
 
-def _check_names(case: MuscleCase) -> None:
-    """Names are used once and refer to something."""
-    bones = [bone.name for bone in case.bone]
-    attachments = [attachment.name for attachment in case.attachment]
-    check_acting(case.effects, bones, case.frames, case.place)
-    check_once([*attachments, FREE], join(case.place, "attachment"))
-    check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
-    check_once([joint.name for joint in case.joint], join(case.place, "joint"))
-    check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
-    check_used(attachments, list(case.fibres.ends.items()), case.place)
-    _check_forces(case)
-    loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
-    check_used([*attachments, FREE], loads, case.place)
-    regions.check(case.region, case.effects, attachments, case.place)
-
-
-def _check_forces(case: MuscleCase) -> None:
-    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
-    bones = [bone.name for bone in case.bone]
-    contact = among(case.effects) is not None
-    for i, attachment in enumerate(case.attachment):
-        if contact and attachment.name in bones:
-            place = join(case.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
-    stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
-    if not case.attachment and not stays:
-        want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
-        raise InputError(join(case.place, "attachment"), "none", want)
-
-
-def _check_rest(case: MuscleCase) -> None:
-    """At the first frame every bone is where its surface is, and nothing acts that comes and goes, unless a stress at rest
-    balances it: the muscle rests.
-    """
-    for i, effect in enumerate(case.effects):
-        acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
-        if acts and in_situ.among(case.effects) is None:
-            got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
-            want = '0 there, where the muscle rests, or the effect "in_situ", which balances it'
-            raise InputError(join(case.place, f"effect[{i}].ramp"), got, want)
-    for i, bone in enumerate(case.bone):
-        pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
-        if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
-            slid = np.array_equal(pose[:3, :3], np.eye(3))
-            what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
-            raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
-
-
-def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
-    check_once(bones, join(place, "bone"))
-    for i, effect in enumerate(acting):
-        if isinstance(effect, Contact):
-            check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
-            if effect.support is not None and in_situ.among(acting) is None:
-                got = f"{effect.support:g} mm"
-                raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')
-            if effect.friction is not None and in_situ.among(acting) is not None:
-                want = 'none beside "in_situ", which balances pressures at rest without friction'
-                raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
-        if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
-            want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
-            raise InputError(join(place, "frames.interval"), "nothing", want)
+def _check_muscles(case: MusclesCase) -> None:
+    """Muscles have a name each, which no bone or attachment has; what acts on all is given for all; each alone is a good case."""
+    check_acting(case.effect, [bone.name for bone in case.bone], case.frames, case.place)
+    others = [bone.name for bone in case.bone]
+    others += [one.name for muscle in case.muscle for one in muscle.attachment]
+    check_once([*(muscle.name for muscle in case.muscle), *dict.fromkeys(others)], join(case.place, "muscle"))
+    if case.expect:
+        raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, of one of them")
+    if in_situ.among(case.effects) is not None:
+        raise InputError(
+            join(case.place, "effect"), '"in_situ" with several muscles', "muscles that rest without stress"
+        )
+    runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
+    for i, muscle in enumerate(case.muscle):
+        used = [(f"muscle[{i}].expect[{k}].of", entry.of) for k, entry in enumerate(muscle.expect)]
+        check_used(runs, used, case.place)
+        if any(isinstance(effect, Interaction) for effect in muscle.effect):
+            want = "contact among the effects of the case, as it acts on all muscles"
+            raise InputError(join(case.place, f"muscle[{i}].effect"), "contact of one muscle", want)
+        part = case.parts[i]
+        _check_effects([name_of(one) for one in part.effect], part.effect, part.place)
+        _checked(part)

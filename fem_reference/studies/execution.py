@@ -1,19 +1,21 @@
 """The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import cast, overload
 
 from fem_reference import solvers
 from fem_reference.assessment import second_check
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem, MusclesSetup
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import Watch
@@ -24,6 +26,7 @@ from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Candidate, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import AnySolver
 from fem_reference.studies import making
@@ -85,10 +88,27 @@ class Bench[C: Case]:
         solvers.check(choice.solver, settings, self.scene.effects, where, task)
         return settings
 
+    @property
+    def parts(self) -> "dict[str, Bench[MuscleCase]]":
+        """The benches of the muscles of a case of several, by name."""
+        scene = self.scene
+        if not isinstance(scene, MusclesCase):
+            return {}
+        made = {
+            one.name: Bench(part, self.store, self.ranks) for one, part in zip(scene.muscle, scene.parts, strict=True)
+        }
+        for name, bench in made.items():
+            bench._setup = partial(_part_of, self._setup, name)
+        return made
+
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
         """InputError where settings of the reference, of a candidate of the case (except frames that are made later) or of the
         ``chosen`` solvers do not suit the case. The problem made of the case is checked only when it is solved.
         """
+        if self.scene.parts:
+            for part in self.parts.values():
+                part.check([one for one in chosen if one[0].solver != "recorded"])
+            return
         named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
         wanted = [(self.scene.reference, "reference"), *chosen]
         settings = [(one, place, self.settings(one, place)) for one, place in [*wanted, *named]]
@@ -110,11 +130,11 @@ class Bench[C: Case]:
         """The run of the case's reference."""
         return self.obtain("reference", self.scene.reference, "reference")
 
-    def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> Iterator[Run]:
+    def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> tuple[Run, ...]:
         """The reference and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
         read = {one.name: self.read(one.name, one, place) for one, place in chosen if one.solver == "recorded"}
-        yield self.reference()
-        yield from (read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen)
+        reference = self.reference()
+        return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""
@@ -148,6 +168,11 @@ class Bench[C: Case]:
     def _made(self, wanted: Wanted) -> Run:
         """The run, solved now, by one process at a time; errors of the input are raised before anything is written."""
         wanted.offer.require(wanted.settings)
+        if self.scene.parts and wanted.choice.solver != "fenicsx":
+            got = f'"{wanted.choice.solver}" for several muscles'
+            raise InputError(
+                join(self.scene.place, "solver"), got, "the reference; others solve each muscle by itself, in compare"
+            )
         if wanted.choice == self.scene.reference:
             self.check()
         given = self.given(wanted.offer, wanted.settings)
@@ -167,7 +192,7 @@ class Bench[C: Case]:
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run
-        return second_check.confirmed_run(self.of_muscle().problem, run)
+        return second_check.confirmed_run(cast("Callable[[], MuscleProblem | MusclesProblem]", self.problem), run)
 
     def _watched(self, solver: str) -> Watch | None:
         """The watch for effects that the case left out and that may turn out to matter."""
@@ -199,10 +224,12 @@ class Bench[C: Case]:
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
         """The input of a solver: the problem, or for a solver without tetrahedra the set-up of the muscle."""
-        return self._problem() if offer.fills(settings) else self._setup()
+        return cast("CaseSetup", self._problem()) if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """A recorded run, checked against the set-up of the scene; it is read each time and not stored."""
+        if self.scene.parts:
+            raise InputError(place, "frames of several muscles", "frames of each, in folders with their names")
         wanted, frames = self.settings(choice, place), list[Frame]()
         assert isinstance(wanted, recorded.RecordedSettings)
         outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
@@ -234,3 +261,10 @@ class Bench[C: Case]:
             "versions": versions(),
             "machine": machine(),
         }
+
+
+def _part_of(of: Callable[[], CaseSetup], name: str) -> Setup:
+    """The set-up of a muscle, by ``name``, of several."""
+    whole = of()
+    assert isinstance(whole, MusclesSetup)
+    return whole.muscles[name]

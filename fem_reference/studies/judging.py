@@ -12,6 +12,7 @@ from fem_reference import solvers
 from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.geometry.field_mesh import l2_distance
@@ -25,6 +26,7 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
+
 _REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
 _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
@@ -35,6 +37,10 @@ def compare(
 ) -> Comparison:
     """Measure and judge the runs of the case of a ``bench``, over all its frames, and how its reference converges."""
     case, setup = bench.scene, bench.setup()
+    if case.parts:
+        raise InputError(
+            case.place, "a comparison of several muscles as one", "one of each: case.parts, and by_muscle of the run"
+        )
     complete_runs = tuple(complete(run, case.numbers) for run in candidates)
     result = comparison.compare(case, setup, complete(reference, case.numbers), complete_runs, error_bars)
     return replace(result, ladders=ladders(setup, case))

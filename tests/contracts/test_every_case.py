@@ -25,7 +25,8 @@ FEW = {"frames.every": 100}
 CASES = {name: casefile.read(name) for name in casefile.cases()}
 FIELDS = [name for name, case in CASES.items() if isinstance(case, ScalarCase)]
 BOX = "box_squeeze"  # which test_box_squeeze solves and judges
-SOLVED = [name for name, case in CASES.items() if name not in (*FIELDS, MAIN_JOB, BOX) and not case.unsolved]
+MUSCLES = [name for name, case in CASES.items() if case.parts]
+SOLVED = [name for name in CASES if name not in (*FIELDS, *MUSCLES, MAIN_JOB, BOX) and not CASES[name].unsolved]
 UNSOLVED = [name for name, case in CASES.items() if case.unsolved]
 
 

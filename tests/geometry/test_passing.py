@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem_reference.geometry.passing import passed
+from fem_reference.geometry.passing import passed, seen_along
 
 FLAT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])  # seen counterclockwise from above
 SHIFT = np.array([0.3, -2.0, 5.0])
@@ -45,3 +45,12 @@ def test_a_triangle_that_turns_past_the_point_and_back() -> None:
     before, after = (FLAT + [[0, 0, a], [0, 0, b], [0, 0, 0]] for a, b in ((0, 4), (4, 0)))
     assert goes((0.1, 0.6, 1.0), (0.8, 0.1, 1.0), before, after)
     assert goes((0.1, 0.6, 1.4), (0.8, 0.1, 1.4), before, after) is False
+
+
+def test_seen_along_is_the_first_back() -> None:
+    sheets = np.stack(
+        [FLAT - [0, 0, 1], FLAT - [0, 0, 3], FLAT[::-1] - [0, 0, 2]]
+    )  # seen from below the first two show their backs
+    up = np.array([[0.2, 0.2, -5.0], [0.2, 0.2, -2.5], [0.8, 0.8, -5.0]])
+    assert seen_along(up, np.tile([0.0, 0, 1], (3, 1)), sheets) == pytest.approx([2, 1.5, np.inf])
+    assert seen_along(up[:1] + [0, 0, 9], np.array([[0.0, 0, -1]]), sheets) == pytest.approx([6])

@@ -6,7 +6,9 @@ a file, and sinks frames as the worker reports them. A worker that dies is the s
 
 import logging
 from dataclasses import replace
+from functools import partial
 from itertools import chain
+from typing import Protocol
 
 import numpy as np
 
@@ -21,11 +23,13 @@ from fem_reference.geometry.quadratic import quadratic
 from fem_reference.problems.body import check_element, check_quadrature
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.tendons import force_name
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.runs.stress_statistics import stress_scalars
+from fem_reference.runs.views import frame_of
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
@@ -35,6 +39,8 @@ from fem_reference.solvers.fenicsx.session import opened, session, shared, solve
 from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings, Settings
 
 log = logging.getLogger(__name__)
+
+AnyMuscle = MuscleProblem | MusclesProblem
 
 __all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "solve_body", "solve_field"]
 
@@ -53,13 +59,13 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 
 
-def solve(problem: MuscleProblem, settings: Settings, sink: Sink) -> Outcome:
+def solve(problem: AnyMuscle, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
     return _solve(problem, settings, sink, None)
 
 
-def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
+def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
     """Continue from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
     there = kept(cut_off, problem.body)
@@ -76,13 +82,14 @@ def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOf
     return _solve(problem, settings, pass_on, there)
 
 
-def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | None) -> Outcome:
-    body, chosen, loads = problem.body, _planned(problem, settings), _are_known(problem, settings)
+def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None) -> Outcome:
+    body, chosen = problem.body, _planned(problem, settings)
+    describe = _describing(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
     def pass_on(frame: Frame) -> None:  # those of the relaxation before the first requested frame are dropped
         if frame.number in problem.frames:
-            described = _described(problem, frame, loads=loads, is_first=not passed)
+            described = describe(frame, is_first=not passed)
             sink(described if chosen.store_state else replace(described, state=None))
             passed.append(frame.number)
 
@@ -93,6 +100,30 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, kept: Kept | 
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
+
+
+class _Describe(Protocol):
+    def __call__(self, frame: Frame, /, *, is_first: bool) -> Frame: ...
+
+
+def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
+    """A function that describes a frame; of several muscles by muscle: scalars then have the muscle's name before a dot."""
+    if isinstance(problem, MuscleProblem):
+        return partial(_described, problem, loads=_are_known(problem, settings))
+    spans, names = problem.spans, tuple(problem.problems)
+    each = {name: _describing(one, settings) for name, one in problem.problems.items()}
+
+    def describe(frame: Frame, /, *, is_first: bool) -> Frame:
+        own, note = dict[str, float](), ""
+        for span in spans:
+            others = tuple(name for name in names if name != span.name)
+            one = each[span.name](frame_of(frame, span, others), is_first=is_first)
+            new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
+            own |= {f"{span.name}.{key}": value for key, value in new.items()}
+            note = one.note
+        return replace(frame, note=note, scalars=frame.scalars | own)
+
+    return describe
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
@@ -172,16 +203,32 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
     return {"attachment_error_rms": float(np.sqrt(np.mean(errors**2))), "attachment_error_max": float(errors.max())}
 
 
-def _samples(problem: MuscleProblem) -> dict[str, tuple[Ints, Floats]]:
+def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
     """Sample points of displacement: by name, the tet of each point and the point at rest, as the map of the tet gives it."""
+    if isinstance(problem, MusclesProblem):  # where muscles are close, a point is in its own
+        each = [_samples(one) for one in problem.problems.values()]
+        starts = [span.cells.start for span in problem.spans]
+        return {
+            name: (
+                np.concatenate([one[name][0] + start for one, start in zip(each, starts, strict=True)]),
+                np.concatenate([one[name][1] for one in each]),
+            )
+            for name in ("surface", "fibres")
+        }
     locator = Locator(problem.mesh)
     wanted = {"surface": problem.surface.points, "fibres": problem.fibres.points}
     return {name: (locator.embed(points).tets, np.asarray(points)) for name, points in wanted.items()}
 
 
-def _planned(problem: MuscleProblem, settings: Settings) -> Settings:
+def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings with open ones filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
+    if isinstance(problem, MusclesProblem):
+        if (settings.ranks or 1) > 1:
+            raise InputError("ranks", settings.ranks, "1, on which several muscles are solved")
+        if settings.linear_solver == "multigrid":
+            raise InputError("linear_solver", '"multigrid"', "another: its levels know no muscles that touch")
+        settings = settings.model_copy(update={"ranks": 1})
     chosen = resources.planned(settings, mesh, resources.available())
     _check_ranks(chosen, "ranks")
     if chosen.ranks is None:
@@ -193,9 +240,9 @@ def _planned(problem: MuscleProblem, settings: Settings) -> Settings:
     return chosen.model_copy(update=changes)
 
 
-def _has_steps(problem: MuscleProblem) -> bool:
+def _has_steps(problem: AnyMuscle) -> bool:
     """True where an effect depends on velocities."""
-    return any("interval" in effect.needs for effect in problem.effects)
+    return any("interval" in effect.needs for effect in problem.body.effects)
 
 
 def _check_ranks(settings: Settings, place: str) -> None:

@@ -223,13 +223,13 @@ class AssembledBody:
         amounts = [effect.amount(frame) for effect in self.effects]
         poses = [entry.pose(frame).ravel() for entry in self.contact.bones] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
-        values = [one.prescribed for one in self.conditions]
-        return np.concatenate([amounts, allowed, *poses, *values])
+        allowed += self.touching.acting() if self.touching else []
+        return np.concatenate([amounts, allowed, *poses, *(one.prescribed for one in self.conditions)])
 
     def set_frame(self, frame: float) -> None:
         """Set loads and prescribed values at ``frame``."""
         self.set_amounts(frame)
-        for one in self.conditions:
+        for one in (*self.conditions, *([self.touching] if self.touching else [])):
             one.move_to(frame)
 
     def scalars(self) -> dict[str, float]:

@@ -168,12 +168,16 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin."""
+        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; where the
+        law has parts, on the points of each.
+        """
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
             forces = self.points.areas[one.pressed, None] * one.traction
-            places = self._places(self.moved, one.pressed)
-            found[entry.name] = forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
+            moments = np.cross(self._places(self.moved, one.pressed), forces)
+            for part, first, last in self.law.parts or (("", 0, len(self.points.areas)),):
+                own = (one.pressed >= first) & (one.pressed < last)
+                found[f"{part} {entry.name}".lstrip()] = forces[own].sum(axis=0), moments[own].sum(axis=0)
         return found
 
     def scalars(self) -> dict[str, float]:

@@ -155,7 +155,8 @@ class Form:
             return {}
         points, corners = self.rule[0], reference_nodes(body.mesh.kind, 1)
         within = points + INWARDS * (corners.mean(axis=0) - points)
-        return {name: self._known(body, share) for name, share in body.shares(self._places(within, cells)).items()}
+        shares = body.shares(self._places(within, cells), np.repeat(cells, len(points)))
+        return {name: self._known(body, share) for name, share in shares.items()}
 
     def _places(self, points: Floats, cells: Ints) -> Floats:
         """The places (n, 3) [mm] at rest of reference ``points`` (q, 3) in all cells."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.geometry.passing import passed
+from fem_reference.geometry.passing import passed, seen_along
 from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 
@@ -70,7 +70,15 @@ class Pass:
         corners = Delaunay(other.element.points).simplices  # of flat pieces of a facet
         turned = np.linalg.det(other.element.points[corners[:, 1:]] - other.element.points[corners[:, :1]]) < 0
         corners[turned] = corners[turned][:, ::-1]
+        self.overlaps, self.share = (
+            np.zeros(len(self.areas)),
+            0.0,
+        )  # at rest, and the share of them that is subtracted now
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
+        middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
+        # Below half the thickness of a part its other side is nearer.
+        triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
+        self.deepest = seen_along(middle.point, -middle.normal, triangles) / 2
 
     def _here(self, nodes: Floats, points: Ints) -> FacetPlaces:
         """The places of ``points`` (n,) on their own facets."""
@@ -82,7 +90,7 @@ class Pass:
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None) -> Met:
         """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
-        reaches as deep as its radius, less than the thickness of two parts.
+        reaches as deep as its radius, and as half the thickness of its part.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
@@ -94,7 +102,8 @@ class Pass:
         if last is not None:
             before[last.points] = last.facets
         beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
-        felt = np.flatnonzero((gap < most) & (gap > -radii[facets]) & (beyond <= _BEYOND))
+        reach = np.minimum(radii, self.deepest)[facets]
+        felt = np.flatnonzero((gap < most) & (gap > -reach) & (beyond <= _BEYOND))
         here = self._here(self.side.nodes(unknowns), some[felt])
         faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
@@ -114,6 +123,12 @@ class Pass:
         kept = (height < most + bulge[facets]) & (height > -(radii + bulge)[facets])
         return some[kept], facets[kept]
 
+    def pressure(self, met: Met) -> tuple[Floats, Floats]:
+        """The pressure (n,) [MPa] of the points that ``met`` the other side, and its slope in the gap; what is left of an overlap
+        at rest is subtracted.
+        """
+        return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
+
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
 
@@ -121,7 +136,7 @@ class Pass:
         So ``dg = n (dx - dy)``, and for ``T = y' (dx - dy)`` and ``D = n dy'`` along both tangents y', with ``a = y' y'``,
         ``b = n y''`` and ``m = a - g b``, ``-d2g = T m^-1 b a^-1 T + 2 T m^-1 D + g D m^-1 D``.
         """
-        there, (pressure, change) = met.there, self.law.pressure(met.gap)
+        there, (pressure, change) = met.there, self.pressure(met)
         away = np.concatenate([met.here.basis, -there.basis], axis=1)
         turn = [np.concatenate([0 * met.here.basis, slope], axis=1) for slope in np.moveaxis(there.slopes, 1, 0)]
         vectors = [there.normal, *np.moveaxis(there.tangents, 1, 0), there.normal, there.normal]

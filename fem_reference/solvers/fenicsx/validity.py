@@ -84,7 +84,7 @@ class Validity:
             stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
-        self.here = State(F=(), regions=body.shares(self.centres))
+        self.here = State(F=(), regions=body.shares(self.centres, self.cells))
 
     def volume_ratio(self) -> float:
         """The present volume of the body over its rest volume."""

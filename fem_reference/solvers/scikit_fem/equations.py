@@ -128,7 +128,8 @@ class Equations:
 
     def _at(self, points: Points, entries: list[Any], fibre: Floats | None) -> State:
         """The state of ``points``, with the shares that they have in regions in the shape of their ``fibre`` or in one row."""
-        shares = self.body.shares(points.places.reshape(-1, 3))
+        cells = np.repeat(points.cells, points.places.shape[1])
+        shares = self.body.shares(points.places.reshape(-1, 3), cells)
         shape = np.shape(entries[0]) if isinstance(entries[0], np.ndarray) else (-1,)
         return replace(_state(entries, fibre), regions={name: one.reshape(shape) for name, one in shares.items()})
 

@@ -16,7 +16,7 @@ from fem_reference.foundations.records import FileName, Record, join, keys, one_
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
-from fem_reference.scenes import casefile
+from fem_reference.scenes import casefile, consistency
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 
@@ -234,7 +234,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
             want = "overshoot for a scalar field, and only there"
             raise InputError(join(where, f"bound[{i}].quantity"), f'"{bound.quantity}"', want)
     if hard.frames is not None:
-        casefile.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
+        consistency.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
     _check_solvers(hard, task)
     timed = hard.frames or scene
     assert timed is not None  # a Hard record has one of the two

@@ -1,0 +1,59 @@
+"""Penetration of muscles into each other: of the solved tetrahedra as a check, of any runs' surfaces as a measure."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+import numpy as np
+
+from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks
+from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.geometry.interpenetration import penetration, skin_of
+from fem_reference.geometry.skins import edge_lengths
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.runs.store import Run
+
+# Facets of tetrahedra are curved, and their corners are straight: where two are pressed, this share of an edge lies between.
+_BULGE = 0.05
+
+
+def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
+    """The check that no muscle is in another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
+    Allowed are the give of contact, and what facets bulge.
+    """
+    if not problem.apart:
+        return ()
+    checks = list[RunCheck]()
+    pressures = np.nan_to_num(run.scalars.get("touching_pressure", np.zeros(len(run.numbers))))
+    for pair in combinations(problem.spans, 2):
+        skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
+        edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
+        law = problem.law
+        for i, number in enumerate(run.numbers):
+            now = nodes(number)
+            if now is None:
+                continue
+            depth, place = penetration(*(one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)))
+            give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
+            allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
+            name = f"{pair[0].name} and {pair[1].name} in each other"
+            checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))
+    return tuple(_worst(checks))
+
+
+def _worst(checks: list[RunCheck]) -> Iterator[RunCheck]:
+    """The check of each name that comes nearest to its allowed value."""
+    for name in dict.fromkeys(one.name for one in checks):
+        yield max((one for one in checks if one.name == name), key=lambda one: one.share)
+
+
+def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
+    """For each two of the muscles by name, their depth (f,) [mm] in each other at the frames of their ``runs``, NaN where one has
+    no surface.
+    """
+    for one, other in combinations(runs, 2):
+        found = list[float]()
+        for a, b in zip(runs[one].positions, runs[other].positions, strict=True):
+            known = np.isfinite(a).all() and np.isfinite(b).all()
+            surfaces = (runs[one].surface.moved_to(a), runs[other].surface.moved_to(b)) if known else None
+            found.append(penetration(*surfaces)[0] if surfaces else np.nan)
+        yield one, other, np.array(found)

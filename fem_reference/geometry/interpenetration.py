@@ -1,0 +1,35 @@
+"""The depth to which two closed surfaces are in each other, from their triangles alone."""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary
+from fem_reference.geometry.distance import distances, inside
+from fem_reference.geometry.intersections import crossings
+
+# Sample points of a triangle that crosses the other surface: its corners, and those of a grid between them.
+_GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
+
+
+def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
+    """The depth [mm] to which two closed surfaces are in each other, and its place (3,): that of the deepest vertex of either in
+    the other, or of the deepest of 28 sample points of a triangle that crosses the other; 0 where they are apart.
+    """
+    pairs = crossings(one, other)
+    depths, places = [np.zeros(1)], [one.points[:1]]
+    for surface, body, crossed in zip((one, other), (other, one), pairs.T, strict=True):
+        corners = surface.points[surface.triangles[np.unique(crossed)]]
+        some = np.concatenate([surface.points, np.einsum("sk,mki->msi", _GRID, corners).reshape(-1, 3)])
+        low, high = body.points.min(axis=0), body.points.max(axis=0)
+        near = some[((some >= low) & (some <= high)).all(axis=1)]
+        within = near[inside(body, near)]
+        if len(within):
+            depths.append(distances(within, body).distance)
+            places.append(within)
+    found = np.concatenate(depths)
+    worst = int(np.argmax(found))
+    return float(found[worst]), np.concatenate(places)[worst]
+
+
+def skin_of(mesh: TetMesh) -> Surface:
+    """The boundary of a ``mesh``, with all its points."""
+    return Surface(mesh.points, boundary(mesh.tets)[0])

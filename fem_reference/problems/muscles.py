@@ -1,0 +1,259 @@
+"""Several muscles of one scene: each as a set-up and a problem of its own, and all as one body with contact between them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fem_reference.effects.touching import Touching as TouchingEffect
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.indicators import Indicator
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.interpenetration import skin_of
+from fem_reference.geometry.intersections import crossings
+from fem_reference.geometry.skins import spacing
+from fem_reference.problems import muscle
+from fem_reference.problems.body import Body
+from fem_reference.problems.estimates import Decision, decision, decisions, estimates
+from fem_reference.problems.joining import called, join
+from fem_reference.problems.muscle import RELAXING, MuscleProblem
+from fem_reference.problems.problem import AtRest, Task
+from fem_reference.problems.setup import Bone, Setup
+from fem_reference.problems.touching import Touching
+from fem_reference.scenes.muscles import MusclesCase
+
+
+@dataclass(frozen=True)
+class Span:
+    """The part of joined arrays that is of one muscle, by its ``name``: of the ``vertices`` of the surface, the points of
+    ``fibres``, the ``points`` of the mesh, and its ``cells``.
+    """
+
+    name: str
+    vertices: slice
+    fibres: slice
+    points: slice
+    cells: slice
+
+
+@dataclass(frozen=True, eq=False)
+class MusclesSetup:
+    """The set-ups of several muscles by name, with the same bones and frames, and the ``pairs`` of muscles that may touch."""
+
+    muscles: dict[str, Setup]
+    pairs: tuple[tuple[str, str], ...]
+
+    task: ClassVar[Task] = "solve"
+    exact: ClassVar[None] = None
+    field: ClassVar[None] = None
+    body: ClassVar[None] = None
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The requested frames."""
+        return next(iter(self.muscles.values())).frames
+
+    @property
+    def bones(self) -> tuple[Bone, ...]:
+        """The bones of all muscles."""
+        return next(iter(self.muscles.values())).bones
+
+    @property
+    def rest(self) -> AtRest:
+        """The surfaces alone, as one."""
+        return AtRest(_surfaces([one.surface for one in self.muscles.values()]))
+
+
+@dataclass(frozen=True, eq=False)
+class MusclesProblem:
+    """The ``problems`` of several muscles by name, solved as one body, with contact of a ``law`` between the ``pairs``, if any.
+    ``apart``: True where muscles must not cross: contact acts between them, or was left out as they do not come near.
+    """
+
+    problems: dict[str, MuscleProblem]
+    pairs: tuple[tuple[str, str], ...]
+    law: TouchingEffect | None
+    apart: bool
+
+    task: ClassVar[Task] = "solve"
+    exact: ClassVar[None] = None
+    field: ClassVar[None] = None
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The requested frames."""
+        return next(iter(self.problems.values())).frames
+
+    @property
+    def seconds(self) -> float:
+        """The time of meshing."""
+        return sum(one.seconds for one in self.problems.values())
+
+    @property
+    def mesh_facts(self) -> dict[str, float | str]:
+        """Facts on the meshes, by muscle."""
+        return {called(name, key): fact for name, one in self.problems.items() for key, fact in one.mesh_facts.items()}
+
+    @cached_property
+    def rest(self) -> AtRest:
+        """All shapes that its frames move, those of one muscle after those of another."""
+        found = list(self.problems.values())
+        starts, lines = [0], list[Floats]()
+        for one in found:
+            starts += (starts[-1] + one.fibres.offsets[1:]).tolist()
+            lines.append(one.fibres.points)
+        known = [one.directions for one in found]
+        along = None
+        if any(one is not None for one in known):
+            blank = [np.tile([1.0, 0.0, 0.0], (len(one.mesh.tets), 1)) for one in found]
+            along = np.concatenate([no if one is None else one for one, no in zip(known, blank, strict=True)])
+        fibres = Polylines(np.concatenate(lines), np.array(starts))
+        return AtRest(_surfaces([one.surface for one in found]), fibres, _meshes([one.mesh for one in found]), along)
+
+    @property
+    def muscle(self) -> MuscleProblem:
+        """None of them: InputError."""
+        raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
+
+    def write_meshes(self, folder: Path) -> None:
+        """Write surface, fibres and tetrahedra of each muscle into a folder with its name in ``folder``, for ParaView."""
+        for name, one in self.problems.items():
+            (folder / name).mkdir(exist_ok=True)
+            one.write_meshes(folder / name)
+
+    @cached_property
+    def body(self) -> Body:
+        """The finite element body of all muscles, with contact between the free surfaces of those that may touch."""
+        bodies, law, first = {name: one.body for name, one in self.problems.items()}, self.law, self.frames[0]
+        touching, relaxed = list[Touching](), (first - RELAXING, first)
+        for one, other in self.pairs:
+            assert law is not None  # without contact no pair may touch
+            at = called(one, "free"), called(other, "free")
+            removed = relaxed if self._near_at_rest(one, other) else None
+            touching.append(Touching(*at, law.stiffness, law.smoothing, relaxed=removed))
+        return join(bodies, tuple(touching))
+
+    def _near_at_rest(self, one: str, other: str) -> bool:
+        """True where the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
+        assert self.law is not None  # called with contact only
+        skins = [skin_of(self.problems[name].mesh) for name in (one, other)]
+        return _apart(*skins) < self.law.smoothing
+
+    @cached_property
+    def spans(self) -> tuple[Span, ...]:
+        """The parts of joined arrays that are of each muscle."""
+        found = self.problems.values()
+        counts = [
+            (len(one.surface.points), len(one.fibres.points), len(one.mesh.points), len(one.mesh.tets)) for one in found
+        ]
+        ends = np.cumsum([(0, 0, 0, 0), *counts], axis=0).tolist()
+        return tuple(
+            Span(name, *(slice(first, last) for first, last in zip(one, other, strict=True)))
+            for name, one, other in zip(self.problems, ends, ends[1:], strict=False)
+        )
+
+
+def _surfaces(parts: Sequence[Surface]) -> Surface:
+    starts = np.cumsum([0, *(len(one.points) for one in parts)])
+    triangles = [one.triangles + start for one, start in zip(parts, starts, strict=False)]
+    return Surface(np.concatenate([one.points for one in parts]), np.concatenate(triangles))
+
+
+def _meshes(parts: Sequence[TetMesh]) -> TetMesh:
+    starts = np.cumsum([0, *(len(one.points) for one in parts)])
+    tets = [one.tets + start for one, start in zip(parts, starts, strict=False)]
+    return TetMesh(np.concatenate([one.points for one in parts]), np.concatenate(tets), maker=parts[0].maker)
+
+
+def setup(case: MusclesCase) -> MusclesSetup:
+    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names what is unusable."""
+    found = {one.name: muscle.setup(part) for one, part in zip(case.muscle, case.parts, strict=True)}
+    law = case.touching
+    pairs = () if law is None else tuple(_near(found, law.smoothing))
+    return MusclesSetup(found, pairs)
+
+
+def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
+    """The problem of all muscles, each filled with tetrahedra and fibres."""
+    parts = zip(rest.muscles.items(), case.parts, strict=True)
+    known = [*case.effect, *(one.effect for one in case.decisions)]
+    apart = any(isinstance(one, TouchingEffect) for one in known)
+    return MusclesProblem(
+        {name: muscle.build(part, one) for (name, one), part in parts}, rest.pairs, case.touching, apart
+    )
+
+
+def _near(muscles: dict[str, Setup], felt: float) -> Iterator[tuple[str, str]]:
+    """The pairs of muscles that may come within ``felt`` [mm] of each other."""
+    return (pair for pair in combinations(muscles, 2) if clearance(muscles[pair[0]], muscles[pair[1]]) < felt)
+
+
+def clearance(one: Setup, other: Setup) -> float:
+    """A lower bound [mm] of the distance of two muscles over all frames: that at rest, less what either can move with a bone.
+    Below 0 where they may cross.
+    """
+    between = max(spacing(one.surface), spacing(other.surface))  # vertices
+    return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
+
+
+def _apart(one: Surface, other: Surface) -> float:
+    """The distance [mm] of two surfaces, by the vertices of each; 0 where they cross."""
+    if len(crossings(one, other)):
+        return 0.0
+    found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]
+    return float(min(found))
+
+
+def _travel(rest: Setup) -> float:
+    """The greatest path [mm] of a point of the muscle with any of the bones that it is attached to."""
+    points, bones = rest.surface.points, {one.bone for one in rest.attached}
+    moved = [
+        np.linalg.norm(apply(bone.pose(frame), points) - points, axis=1).max()
+        for bone in bones
+        for frame in rest.frames
+    ]
+    return float(max(moved, default=0.0))
+
+
+def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
+    """Decisions on each effect: one of all muscles is needed where one needs it, contact between them where they come near."""
+    found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
+    every: list[Decision] = []
+    for effect in case.effects:
+        if isinstance(effect, TouchingEffect):
+            every.append(_touches(case, rest, effect))
+            continue
+        asked = [one for some in found for one in some if one.effect is effect]
+        every.append(next((one for one in asked if one.needed), asked[0]))
+    return tuple(every)
+
+
+def _touches(case: MusclesCase, rest: MusclesSetup, effect: TouchingEffect) -> Decision:
+    """The decision on contact between muscles, by the least clearance of two."""
+    known = estimates(case.parts[0], next(iter(rest.muscles.values())))
+    pairs = list(combinations(rest.muscles, 2))
+    gaps = [clearance(rest.muscles[one], rest.muscles[other]) for one, other in pairs]
+    nearest = int(np.argmin(gaps))
+    depth = max(effect.smoothing - gaps[nearest], 0.0)
+    rule = f"guaranteed clearance between muscles [mm] ({' and '.join(pairs[nearest])})"
+    found = decision(effect, Indicator(rule, gaps[nearest], depth, effect.stiffness * depth), known)
+    return replace(found, listed=case.choice == "listed")
+
+
+def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
+    """The case with the effects that are needed, of all muscles and of each."""
+    kept: list[Any] = [one.effect for one in found if one.needed]
+    own = tuple(
+        one.model_copy(
+            update={"effect": tuple(effect for effect in one.effect if any(effect is some for some in kept))}
+        )
+        for one in case.muscle
+    )
+    shared = tuple(effect for effect in case.effect if any(effect is some for some in kept))
+    return case.model_copy(update={"choice": "listed", "effect": shared, "muscle": own, "decisions": found})

@@ -1,0 +1,67 @@
+"""Frames and runs of several muscles as those of one of them. Scalars of one muscle have its name before a dot."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.muscles import MusclesProblem, Span
+from fem_reference.runs.states import NodalState
+from fem_reference.runs.store import Frame, Run
+
+# Scalars of all muscles together, which say nothing of one.
+_OF_ALL = ("volume_ratio", "energy", "force_", "moment_", "net_", "attachment_error_", "stress_", "load_")
+
+
+def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
+    """The part of a ``frame`` of several muscles that is of one; the force of each of the ``others`` on it has the other's name."""
+    assert frame.surface is not None  # of the reference
+    assert frame.fibres is not None
+    forces, moments = (
+        {own: vector for key, vector in some.items() if (own := _own(key, span.name, others))}
+        for some in (frame.forces, frame.moments)
+    )
+    return replace(
+        frame,
+        surface=frame.surface[span.vertices],
+        fibres=frame.fibres[span.fibres],
+        points=frame.points[span.points],
+        state=None if frame.state is None else _state_of(frame.state, span.cells),
+        forces=forces,
+        moments=moments,
+    )
+
+
+def _own(key: str, name: str, others: tuple[str, ...]) -> str:
+    """The name that a force, by its ``key``, has for the muscle of a ``name``; empty where it is not on it."""
+    for other in others:
+        if key == f"{other} free on {name} free":
+            return other
+    return key.removeprefix(f"{name} ") if key.startswith(f"{name} ") and not key.endswith(" free") else ""
+
+
+def _state_of(state: NodalState, cells: slice) -> NodalState:
+    """The state of some of the cells."""
+    before = state.before[cells] if len(state.before) else state.before
+    return replace(state, displacement=state.displacement[cells], pressure=state.pressure[cells], before=before)
+
+
+def run_of(run: Run, problem: MusclesProblem, name: str) -> Run:
+    """The ``run`` of several muscles as one of the muscle of a ``name``, in memory."""
+    span, own = next(one for one in problem.spans if one.name == name), problem.problems[name]
+    begin = f"{name}."
+    scalars: dict[str, Floats] = {
+        key: values for key, values in run.scalars.items() if "." not in key and not key.startswith(_OF_ALL)
+    }
+    scalars |= {key.removeprefix(begin): values for key, values in run.scalars.items() if key.startswith(begin)}
+    lines = run.fibre_positions
+    return replace(
+        run,
+        surface=own.surface,
+        positions=np.asarray(run.positions[:, span.vertices]),
+        fibres=own.fibres,
+        fibre_positions=None if lines is None else np.asarray(lines[:, span.fibres]),
+        scalars=scalars,
+        folder=None,
+        states=(),
+    )

@@ -1,0 +1,84 @@
+"""Checks of the case of a muscle beyond those of its keys: names are used once and refer to something, and it rests at first."""
+
+import numpy as np
+
+from fem_reference.effects import Effect, Ramped, in_situ
+from fem_reference.effects.contact import Contact, among
+from fem_reference.effects.damping import Damping
+from fem_reference.effects.touching import Touching
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, check_once, check_used, join
+from fem_reference.scenes import regions
+from fem_reference.scenes.muscle import Frames, MuscleCase
+
+# What a load acts on, where it is no attachment: the surface that is not attached to bone.
+FREE = "free"
+
+
+def check_names(case: MuscleCase) -> None:
+    """Names are used once and refer to something."""
+    if any(isinstance(effect, Touching) for effect in case.effects):
+        raise InputError(
+            join(case.place, "effect"), '"touching" of a single muscle', "several muscles, or no such effect"
+        )
+    bones = [bone.name for bone in case.bone]
+    attachments = [attachment.name for attachment in case.attachment]
+    check_acting(case.effects, bones, case.frames, case.place)
+    check_once([*attachments, FREE], join(case.place, "attachment"))
+    check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
+    check_once([joint.name for joint in case.joint], join(case.place, "joint"))
+    check_used(bones, [(f"joint[{i}].bone", joint.bone) for i, joint in enumerate(case.joint)], case.place)
+    check_used(attachments, list(case.fibres.ends.items()), case.place)
+    _check_forces(case)
+    loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
+    check_used([*attachments, FREE], loads, case.place)
+    regions.check(case.region, case.effects, attachments, case.place)
+
+
+def _check_forces(case: MuscleCase) -> None:
+    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
+    bones = [bone.name for bone in case.bone]
+    contact = among(case.effects) is not None
+    for i, attachment in enumerate(case.attachment):
+        if contact and attachment.name in bones:
+            place = join(case.place, f"attachment[{i}].name")
+            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
+    stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
+    if not case.attachment and not stays:
+        want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
+        raise InputError(join(case.place, "attachment"), "none", want)
+
+
+def check_rest(case: MuscleCase) -> None:
+    """At the first frame every bone is where its surface is, and nothing acts that comes and goes, unless a stress at rest
+    balances it: the muscle rests.
+    """
+    for i, effect in enumerate(case.effects):
+        acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
+        if acts and in_situ.among(case.effects) is None:
+            got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
+            want = '0 there, where the muscle rests, or the effect "in_situ", which balances it'
+            raise InputError(join(case.place, f"effect[{i}].ramp"), got, want)
+    for i, bone in enumerate(case.bone):
+        pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
+        if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
+            slid = np.array_equal(pose[:3, :3], np.eye(3))
+            what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
+            raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
+
+
+def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
+    """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
+    check_once(bones, join(place, "bone"))
+    for i, effect in enumerate(acting):
+        if isinstance(effect, Contact):
+            check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
+            if effect.support is not None and in_situ.among(acting) is None:
+                got = f"{effect.support:g} mm"
+                raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')
+            if effect.friction is not None and in_situ.among(acting) is not None:
+                want = 'none beside "in_situ", which balances pressures at rest without friction'
+                raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
+        if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
+            want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
+            raise InputError(join(place, "frames.interval"), "nothing", want)

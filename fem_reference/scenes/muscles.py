@@ -1,0 +1,131 @@
+"""The case of several muscles, which share bones, frames and a reference, as frozen records; and each of them as a case."""
+
+from collections.abc import Iterator
+from typing import Any, Literal, Self
+
+from pydantic import Field
+
+from fem_reference.effects import Effect
+from fem_reference.effects.touching import Touching
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Name, join
+from fem_reference.scenes.case import Case, Expectation
+from fem_reference.scenes.fibres import Fibres
+from fem_reference.scenes.muscle import Attachment, CaseBone, CaseJoint, Frames, Muscle, MuscleCase
+from fem_reference.scenes.regions import CaseRegion
+
+# The keys of one muscle among several that are tables beside the muscle where it is alone.
+BESIDE = ("attachment", "fibres", "region", "expect")
+
+
+class MuscleOfSeveral(Muscle):
+    """One of several muscles: its ``name``, which is also in the names of its forces, and all that is its own. ``effect``: those
+    that act in it, besides those of the case; ``expect``: what is expected of it.
+    """
+
+    name: Name
+    attachment: tuple[Attachment, ...] = ()
+    region: tuple[CaseRegion, ...] = ()
+    fibres: Fibres
+    effect: tuple[Any, ...] = ()
+    expect: tuple[Expectation, ...] = ()
+
+
+class MusclesCase(Case):
+    """The case of several muscles. Its key ``effects`` (``choice``) is as that of a muscle's case; ``effect`` acts on all."""
+
+    choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
+    muscle: tuple[MuscleOfSeveral, ...] = Field(min_length=2)
+    bone: tuple[CaseBone, ...] = Field(min_length=1)
+    joint: tuple[CaseJoint, ...] = ()
+    frames: Frames
+
+    task = "solve"
+    carries = MuscleCase.carries
+    determined_by = frozenset({"muscle", "bone", "frames"})
+    naming_files = MuscleCase.naming_files
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The frame numbers wanted."""
+        return self.frames.numbers
+
+    @property
+    def touching(self) -> Touching | None:
+        """The contact between the muscles, None without."""
+        return next((one for one in self.effect if isinstance(one, Touching)), None)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of all muscles, then those of each."""
+        return (*self.effect, *(one for muscle in self.muscle for one in muscle.effect))
+
+    @property
+    def acting(self) -> dict[str, Effect]:
+        """The effects by their names, those of one muscle after its name."""
+        own = {f"{muscle.name}: {one.title}": one for muscle in self.muscle for one in muscle.effect}
+        return {one.title: one for one in self.effect} | own
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """The contents of the case in words, by name."""
+        return {
+            "muscles": ", ".join(muscle.name for muscle in self.muscle),
+            "bones": ", ".join(bone.name for bone in self.bone),
+            "frames": f"{self.frames.first} to {self.frames.last}, every {self.frames.every}",
+        }
+
+    def determining(self) -> dict[str, Any]:
+        """The keys that determine its solution, without what is expected of it."""
+        tables = super().determining()
+        return tables | {
+            "muscle": [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
+        }
+
+    def expecting(self, more: tuple[Expectation, ...]) -> Self:
+        """The case that expects ``more`` of each muscle."""
+        muscles = (one.model_copy(update={"expect": (*one.expect, *more)}) for one in self.muscle)
+        return self.model_copy(update={"muscle": tuple(muscles)})
+
+    @property
+    def parts(self) -> tuple[MuscleCase, ...]:
+        """Each muscle as a case of its own, in which the others are not there."""
+        return tuple(self._parts())
+
+    def _parts(self) -> Iterator[MuscleCase]:
+        """The cases, which were checked as this one was read."""
+        everywhere = tuple(one for one in self.effect if not isinstance(one, Touching))
+        for i, muscle in enumerate(self.muscle):
+            own = {name: getattr(muscle, name) for name in BESIDE}
+            alone = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})
+            yield MuscleCase.model_construct(
+                None,
+                title=f"{self.title}: {muscle.name}",
+                name=f"{self.name}_{muscle.name}",
+                proves=self.proves,
+                choice=self.choice,
+                effect=(*everywhere, *muscle.effect),
+                muscle=alone,
+                bone=self.bone,
+                joint=self.joint,
+                frames=self.frames,
+                reference=self.reference,
+                candidate=self.candidate,
+                folder=self.folder,
+                place=join(self.place, f"muscle[{i}]"),
+                from_file=self.from_file,
+                **own,
+            )
+
+
+def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
+    """The ``table`` of a scene with one muscle in a list as that of a scene of a muscle; unchanged where it has several."""
+    listed = table.get("muscle")
+    if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):
+        return table
+    muscle = {key: value for key, value in listed[0].items() if key not in (*BESIDE, "effect", "name")}
+    own = {key: listed[0][key] for key in (*BESIDE, "effect") if key in listed[0]}
+    for key in set(own) & set(table) - {"effect", "expect"}:
+        raise InputError(join(place, key), f"it, and muscle[0].{key}", "one of the two")
+    lists = {key: [*table.get(key, []), *own.pop(key)] for key in ("effect", "expect") if key in own}
+    return table | own | lists | {"muscle": muscle}

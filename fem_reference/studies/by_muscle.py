@@ -1,0 +1,83 @@
+"""Several muscles of one reference: a comparison of each, with candidates that solve it by itself."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment import neighbours
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.runs.store import Run, complete
+from fem_reference.runs.views import run_of
+from fem_reference.scenes.case import Candidate
+from fem_reference.studies import judging
+from fem_reference.studies.execution import Bench
+
+# A remark on the candidates.
+ALONE = "Each candidate solves each muscle by itself: it knows nothing of the other muscles."
+
+
+@dataclass(frozen=True, eq=False)
+class ByMuscle:
+    """Comparisons of the ``muscles`` of a case by name. ``worst``: for each solver that has two of them, the solver, the two, the
+    greatest depth [mm] to which they are in each other, and its frame.
+    """
+
+    muscles: dict[str, Comparison]
+    worst: tuple[tuple[str, str, str, float, int], ...]
+
+    @property
+    def penetration(self) -> list[dict[str, object]]:
+        """The depths as rows."""
+        names = ("solver", "muscle", "other", "depth_mm", "frame")
+        return [dict(zip(names, row, strict=True)) for row in self.worst]
+
+
+def views(bench: Bench[Any], run: Run) -> dict[str, Run]:
+    """The ``run`` of several muscles as one of each, by name."""
+    problem, parts = bench.problem(), bench.parts
+    assert isinstance(problem, MusclesProblem)
+    found = {name: run_of(run, problem, name) for name in parts}
+    return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
+
+
+def compared(bench: Bench[Any], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
+    """The comparison of each muscle of a case of several: with the one reference of all, and with candidates that solve it alone.
+    Frames are read from folders with the names of the muscles; a candidate may lack some.
+    """
+    parts, found = bench.parts, dict[str, Comparison]()
+    for entry, place in chosen:
+        if all(_own((entry, place), name) is None for name in parts):
+            want = f"folders {' or '.join(parts)} in it, with the frames of these muscles"
+            raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
+    reference = bench.reference()
+    whole = views(bench, reference)
+    runs: dict[str, dict[str, Run]] = {"reference": whole}
+    for name, part in parts.items():
+        own = [one for one in (_own(entry, name) for entry in chosen) if one is not None]
+        solved = [part.obtain(entry.name, entry, place) for entry, place in own]
+        for run in solved:
+            runs.setdefault(run.name, {})[name] = complete(run, part.scene.numbers)
+        found[name] = judging.compare(part, whole[name], solved)
+    return ByMuscle(found, tuple(_worst(runs)))
+
+
+def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
+    """A candidate with its place, its frames those of the muscle of a ``name``; None where it has none of it."""
+    entry, place = chosen
+    if entry.solver != "recorded":
+        return chosen
+    folder = Path(entry.settings["folder"]) / name
+    return (entry.model_copy(update={"folder": str(folder)}), place) if folder.exists() else None
+
+
+def _worst(runs: dict[str, dict[str, Run]]) -> Iterator[tuple[str, str, str, float, int]]:
+    """The rows of ``ByMuscle.worst``."""
+    for who, own in runs.items():
+        for one, other, depth in neighbours.depths(own):
+            at = int(np.nanargmax(depth)) if np.isfinite(depth).any() else 0
+            yield who, one, other, float(depth[at]), own[one].numbers[at]

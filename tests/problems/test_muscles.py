@@ -1,0 +1,133 @@
+"""Several muscles as one problem: each keeps its place in joined arrays, only near ones touch, and one muscle is not all."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.io import files
+from fem_reference.problems import muscles, of_case
+from fem_reference.runs.states import NodalState
+from fem_reference.runs.store import Frame, Outcome, collected
+from fem_reference.runs.views import frame_of, run_of
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.studies import judging
+from fem_reference.studies.execution import Bench
+
+COUNTS = {"a": (1, 1, 2), "b": (1, 1, 3)}
+ARAP = {"weights": "clamped cotangent", "iterations": 4, "volume_constraint": True}
+BOXES = {"floor": -5, "lid": 25}
+ENDS = "".join(
+    f'[[muscle.attachment]]\nname = "{name}"\nbone = "{bone}"\nwithin = "0.1 mm"\n'
+    for name, bone in (("low", "floor"), ("top", "lid"))
+)
+
+
+def text(effects: str = "listed", slide: int = 2) -> str:
+    """Two bars of 10 x 10 x 20 mm, 5 mm apart, between a floor and a lid that slides along them."""
+    bones = "".join(
+        f'[[bone]]\nname = "{name}"\nbox = {{ centre = "10, 5, {z} mm", size = "60, 60, 10 mm" }}\n'
+        for name, z in BOXES.items()
+    )
+    knots = f'[{{ frame = 0, distance = "0 mm" }}, {{ frame = 2, distance = "{slide} mm" }}]'
+    motion = f"[bone.motion]\ndirection = [1, 0, 0]\nkeyframes = {knots}\n"
+    own = "".join(
+        f'[[muscle]]\nname = "{name}"\nsurface = "{name}.vtp"\nunit = "mm"\ntet_size = "10 mm"\nmesher = "block"\n{ENDS}'
+        '[muscle.fibres.polylines]\nfile = "lines.vtp"\nunit = "mm"\n'
+        + ('[[muscle.effect]]\nname = "viscosity"\neta = "1 kPa s"\n' if name == "b" else "")
+        for name in COUNTS
+    )
+    effect = '[[effect]]\nname = "neo_hooke"\nmu = "10 kPa"\n[[effect]]\nname = "incompressible"\nbulk = "10 MPa"\n'
+    touching = '[[effect]]\nname = "touching"\nstiffness = "1 MPa/mm"\nsmoothing = "0.1 mm"\n'
+    head = f'title = "Two"\nproves = "so"\neffects = "{effects}"\n'
+    frames = '[frames]\nfirst = 0\nlast = 2\nevery = 1\ninterval = "1 s"\n[reference]\nsolver = "fenicsx"\n'
+    return head + own + bones + motion + effect + touching + frames
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for i, (name, counts) in enumerate(COUNTS.items()):
+        bar = shapes.skin(shapes.box(counts, (10.0, 10.0, 20.0)))
+        files.write_surface(tmp_path / f"{name}.vtp", bar, bar.points + [15 * i, 0, 0])
+
+    lines = Polylines(np.array([[5.0, 5, 1], [5, 5, 10], [5, 5, 19]]), np.array([0, 3]))
+    files.write_polylines(tmp_path / "lines.vtp", lines, lines.points)
+    return tmp_path
+
+
+def case_of(folder: Path, **how):
+    (folder / "case.toml").write_text(text(**how), encoding="utf-8")
+    return casefile.read(folder)
+
+
+def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
+    # 5 mm apart at rest, less what the lid moves either, and the spacing of points.
+    for slide, near in ((1, False), (3, True)):
+        case = of_case.chosen(case_of(folder, effects="auto", slide=slide))
+        assert (case.touching is not None) is near
+        said = next(str(one) for one in case.decisions if one.effect.title == "Touching")
+        assert ("left out" in said) is not near
+        rest = of_case.setup(case_of(folder, slide=slide))
+        assert rest.pairs == ((("a", "b"),) if near else ())
+        gap = muscles.clearance(rest.muscles["a"], rest.muscles["b"])
+        assert 5 - 2 * slide - 1 < gap < 5 - 2 * slide
+
+
+def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
+    case = case_of(folder)
+    problem = of_case.problem(case, of_case.setup(case))
+    body, rest, (a, b) = problem.body, problem.rest, problem.spans
+    assert [effect.title for effect in body.effects] == ["NeoHooke", "Incompressible", "Viscosity in b"]
+    first, last = body.within["b"]
+    assert body.mesh.points[body.mesh.cells[first:last]][..., 0].min() == 15
+    assert (first, last) == (b.cells.start, b.cells.stop)
+    assert {"a low", "a free", "b top"} <= set(body.mesh.facets)
+    assert rest.surface.points[b.vertices] == pytest.approx(problem.problems["b"].surface.points)
+    assert rest.mesh.points[rest.mesh.tets[b.cells]].reshape(-1, 3)[:, 0].min() == 15
+    state = NodalState(
+        np.arange(len(rest.mesh.tets))[:, None, None] * np.ones((1, 10, 3)),
+        np.zeros((len(rest.mesh.tets), 4)),
+        np.zeros((0, 0, 3)),
+    )
+    forces = {
+        "a low": np.ones(3),
+        "b low": 2 * np.ones(3),
+        "b free on a free": 3 * np.ones(3),
+        "a free on b free": 4 * np.ones(3),
+    }
+    frame = Frame(
+        0,
+        rest.surface.points,
+        rest.fibres.points,
+        rest.mesh.points,
+        {"energy": 1.0, "b.volume": 2.0, "b": 3.0},
+        state=state,
+        forces=forces,
+    )
+    own = frame_of(frame, b, ("a",))
+    assert {name: force[0] for name, force in own.forces.items()} == {"low": 2, "a": 4}
+    assert {name: force[0] for name, force in frame_of(frame, a, ("b",)).forces.items()} == {"low": 1, "b": 3}
+    assert own.state.displacement[0, 0, 0] == len(problem.problems["a"].mesh.tets)
+    run = run_of(collected([frame], Outcome("converged", ""), rest), problem, "b")
+    assert run.positions[0] == pytest.approx(problem.problems["b"].surface.points)
+    assert {name: values[0] for name, values in run.scalars.items()} == {
+        "volume": 2.0,
+        "b": 3.0,
+    }  # and no energy of both
+
+
+def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) -> None:
+    bench = Bench(case_of(folder), tmp_path / "runs")
+    with pytest.raises(InputError, match=r'"arap_pbd" for several muscles, want the reference'):
+        bench.obtain("arap", SolverChoice(solver="arap_pbd", **ARAP), "solver")
+    with pytest.raises(InputError, match="a case of several muscles, want the case of a muscle"):
+        bench.of_muscle()
+    with pytest.raises(InputError, match=r"several \(a, b\), want a case of one muscle"):
+        _ = bench.problem().muscle
+    rest = collected([Frame(0, bench.problem().rest.surface.points)], Outcome("converged", ""), bench.problem().rest)
+    with pytest.raises(InputError, match="a comparison of several muscles as one"):
+        judging.compare(bench, rest, [])
