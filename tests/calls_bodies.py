@@ -151,7 +151,7 @@ def solving(draw: Any) -> Callable[[], Any]:
 
 def denied(body: fr.Body, solved: Run) -> None:
     """AssertionError where what is said to be converged is not: by the second check, which bodies pass through on their way here,
-    and beyond it by det F, by finite numbers and by forces that balance, as nothing but what is prescribed acts on these bodies.
+    and beyond it by det F and by finite numbers.
     """
     numbers = [state.number for state in solved.states]
     assert solved.outcome.message
