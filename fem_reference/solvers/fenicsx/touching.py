@@ -57,7 +57,7 @@ class TouchingForces:
         return [one.share for one in self.passes]
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """By pass the skin around the other part, that its points may not touch; None where there is none."""
+        """The skin around the other part of each pass, that its points may not touch; None where there is none."""
         pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
         around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
         return [
