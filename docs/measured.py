@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import reference_pages
-from measurements import KEPT, MEASUREMENTS, TABLES
+from measurements import KEPT, MEASUREMENTS, TABLES, Measurement
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = TABLES | {"effect_parameters": reference_pages.parameters}
@@ -43,7 +43,7 @@ def measure(name: str, folder: Path | None, commit: str) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         found = (folder or Path(scratch)) / f"{name}.json"
         if folder is None:
-            _make(measurement.command, found)
+            _make(measurement, found)
         measured = measurement.keep(json.loads(found.read_text(encoding="utf-8")))
         when = datetime.fromtimestamp(found.stat().st_mtime, UTC)
     words = ["git", "log", "-1", "--format=%h", commit]
@@ -55,10 +55,16 @@ def measure(name: str, folder: Path | None, commit: str) -> None:
     (KEPT / f"{name}.json").write_text(_short(lines) + "\n", encoding="utf-8")
 
 
-def _make(command: str, path: Path) -> None:
-    """Measure, and write the JSON of the verb to ``path``."""
-    words = [*command.split()[1:], "--out", str(path.parent), "--json", str(path)]
-    subprocess.run([sys.executable, "-m", "fem_reference", *words], cwd=ROOT, check=True)
+def _make(measurement: Measurement, path: Path) -> None:
+    """Measure, and write the JSON of the verb to ``path``; that of several cases by their names, also where one has no solution."""
+    found = {}
+    for case in measurement.cases or ("",):
+        words = measurement.command.replace("CASE", case).split()[1:]
+        words = [sys.executable, "-m", "fem_reference", *words, "--out", str(path.parent), "--json", str(path)]
+        subprocess.run(words, cwd=ROOT, check=not case)
+        found[case] = json.loads(path.read_text(encoding="utf-8"))
+    if measurement.cases:
+        path.write_text(json.dumps(found), encoding="utf-8")
 
 
 def _short(text: str) -> str:

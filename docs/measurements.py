@@ -23,14 +23,17 @@ _COUNTED = {verdict: (verdict,) for verdict in VERDICTS if verdict not in _TWO} 
 # Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
 _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
+# Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
+_FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
 
 
 class Measurement(NamedTuple):
-    """A ``command``; ``keep`` picks from its JSON what tables need."""
+    """A ``command``; ``keep`` picks from its JSON what tables need; made of each of the ``cases``, if any, in place of CASE."""
 
     command: str
     keep: Callable[[Any], Any]
+    cases: tuple[str, ...] = ()
 
 
 def kept(name: str) -> dict[str, Any]:
@@ -256,6 +259,30 @@ def _study_reference() -> str:
     return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
 
 
+def _fibre_ends(found: dict[str, Any]) -> Any:
+    rows = []
+    for case, one in found.items():
+        facts = {key: value for key, value in one["mesh"].items() if key.startswith("fibre_end")}
+        covered = {key[:-16]: value for key, value in one["mesh"].items() if key.endswith("_covered_percent")}
+        ends = [each for each in one["measures"] if each["metric"] == "fibre_ends" and each["statistic"] == "max"]
+        off = {each["frame"]: each["value"] for each in ends if each["candidate"] == "reference" and each["frame"]}
+        rows.append({"case": case, "status": one["status"], "facts": facts, "covered": covered, "off": off})
+    return rows
+
+
+def _fibre_ends_rows() -> str:
+    rows = []
+    for one in kept("fibre_ends")["measured"]:
+        facts, covered = one["facts"], ", ".join(f"{name} {value:.0f}" for name, value in one["covered"].items())
+        words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_on_by_tendon", "")
+        named = [f"{end} of {fibre} {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
+        far = ("by a tendon: " if "fibre_ends_on_by_tendon" in facts else "") + (", ".join(named) or "none")
+        off = [one["status"] if value is None else f"{value:.1f}" for value in one["off"].values()] or [one["status"]]
+        rows.append((f"`{one['case']}`", covered, f"{facts['fibre_ends']:.0f}", far, ", ".join(off)))
+    beside, off_bone = "more than 2 mm from their attachment", "worst end off its bone, 0.5, 1 rad, mm"
+    return table("fibre_ends", ("case", "covered by ends, %", "ends", beside, off_bone), rows)
+
+
 def _fronts(found: dict[str, Any]) -> Any:
     """A study of all solvers, with the errors and costs that are drawn."""
     case = found["cases"][0]
@@ -343,6 +370,15 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
+    "fibre_ends": Measurement(
+        "./fem run CASE --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --set expect=[]",
+        _fibre_ends,
+        (
+            *("hip_flexion", "hip_flexion_tendon", "adductor_brevis", "gluteus_medius", "gluteus_medius_anatomical"),
+            *("iliacus", "iliacus_anatomical", "iliacus_in_situ"),
+            *("gluteus_maximus", "gluteus_maximus_anatomical", "gluteus_maximus_tract"),
+        ),
+    ),
     "fronts": Measurement(
         "./fem study hip_flexion --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --solver fenicsx "
         "--solver xpbd --solver pbd --solver arap --solver arap_pbd --solver mass_spring --solver viper",
@@ -363,6 +399,7 @@ TABLES = {
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
     "study_reference": _study_reference,
+    "fibre_ends": _fibre_ends_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
     "uncertainty_bands": _uncertainty_bands,

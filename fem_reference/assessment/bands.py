@@ -7,11 +7,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from fem_reference.assessment import chaos, gaussian_process
 from fem_reference.assessment.chaos import Chaos
-from fem_reference.assessment.gaussian_process import Process
+from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
@@ -48,6 +47,8 @@ class Design:
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
     """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable once in each of so many equal parts of its range."""
+    from scipy.stats import qmc  # half a second
+
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 
 
@@ -58,7 +59,7 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
     refused = design.refused or _not_numbers(known)
     if refused:
         return replace(band, refused=refused)
-    surrogate: Chaos | Process | None = chaos.fit(design.points, known)
+    surrogate: Chaos | GaussianProcess | None = chaos.fit(design.points, known)
     if surrogate is None:
         return _filled(replace(band, by="runs"), defined, np.repeat(known[:1], 3, axis=0))
     if surrogate.error > WORST:
@@ -88,7 +89,7 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
 
 
 def _banded(
-    band: Band, design: Design, surrogate: Chaos | Process, defined: Floats, runs: Floats, predicted: Floats
+    band: Band, design: Design, surrogate: Chaos | GaussianProcess, defined: Floats, runs: Floats, predicted: Floats
 ) -> Band:
     """The ``band`` by what a surrogate ``predicted`` (s, f), or where that is too bad by the ``runs`` (n, f) themselves."""
     band = replace(band, error=surrogate.error)
@@ -115,6 +116,8 @@ def _filled(band: Band, defined: Floats, found: Floats) -> Band:
 
 def _samples(design: Design) -> Floats:
     """Points at which a surrogate is asked."""
+    from scipy.stats import qmc
+
     return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)
 
 

@@ -24,7 +24,7 @@ _SAMPLES = 13  # as a power of 2
 
 
 @dataclass(frozen=True, eq=False)
-class Process:
+class GaussianProcess:
     """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
     noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
 
@@ -44,12 +44,12 @@ class Process:
     @property
     def first(self) -> Floats:
         """The share (d,) of the variance by each variable alone."""
-        return self._shares[0]
+        return np.asarray(self._shares[0])
 
     @property
     def total(self) -> Floats:
         """The share (d,) of the variance by each variable alone and with others."""
-        return self._shares[1]
+        return np.asarray(self._shares[1])
 
     @cached_property
     def _shares(self) -> Floats:
@@ -62,10 +62,10 @@ class Process:
         for i in range(variables):
             mixed = self(np.where(np.arange(variables) == i, other, one))
             shares.append((((there - here.mean(axis=0)) * (mixed - here)).mean(), ((here - mixed) ** 2).mean() / 2))
-        return np.array(shares).T * here.shape[1] / here.var(axis=0).sum()
+        return np.asarray(np.array(shares).T * here.shape[1] / here.var(axis=0).sum())
 
 
-def fit(points: Floats, outputs: Floats) -> Process:
+def fit(points: Floats, outputs: Floats) -> GaussianProcess:
     """The process of ``outputs`` (n, q) that vary, at ``points`` (n, d) from -1 to 1, with its error.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
@@ -80,14 +80,14 @@ def fit(points: Floats, outputs: Floats) -> Process:
         found = _fitted(points[~out], outputs[~out], whole.logs)
         missed += float(((found(points[out]) - outputs[out]) ** 2).sum())
     error = missed / (len(points) * float(outputs.var(axis=0).sum()))
-    return Process(whole.points, whole.logs, whole.trend, whole.weights, error)
+    return GaussianProcess(whole.points, whole.logs, whole.trend, whole.weights, error)
 
 
-def _fitted(points: Floats, outputs: Floats, start: Floats) -> Process:
+def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
     """The process of greatest likelihood near the logarithms ``start`` (d + 1,)."""
     bounds = [tuple(np.log(_LENGTHS))] * points.shape[1] + [tuple(np.log(_NOISE))]
     found = minimize(_unlikely, start, (points, outputs), jac=True, method="L-BFGS-B", bounds=bounds).x
-    return Process(points, found, *_solved(points, outputs, found)[:2])
+    return GaussianProcess(points, found, *_solved(points, outputs, found)[:2])
 
 
 def _unlikely(logs: Floats, points: Floats, outputs: Floats) -> tuple[float, Floats]:

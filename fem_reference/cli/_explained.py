@@ -9,6 +9,8 @@ PAGES = (
     (".toml: effect", "effects.md"),
     (".toml: region", "effects.md#regions"),
     (".toml: ", "scene_keys.md"),
+    (": crashed, ", "your_own_solver.md#your-solver-as-a-command"),
+    ("verdict: not judged", "measures.md#verdicts"),
     ("verdict: doubtful pass", "measures.md#verdicts"),
     ("verdict: inconclusive", "error_bars.md"),
     (": denied, ", "verification.md#the-second-check"),

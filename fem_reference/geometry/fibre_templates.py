@@ -8,7 +8,6 @@ bends. A muscle with several heads is followed along its greatest section only; 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, normals
@@ -136,6 +135,8 @@ def _samples(ends: Floats, heights: Floats) -> Floats:
 
 def _smooth(line: Floats) -> Floats:
     """The line (40, 3) with each point on the parabola nearest to it and six neighbours; the ends stay."""
+    from scipy.signal import savgol_filter  # half a second, with scipy.stats
+
     found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
     found[[0, -1]] = line[[0, -1]]
     return np.asarray(found)

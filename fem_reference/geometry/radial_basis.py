@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
-from scipy.stats import qmc
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
@@ -66,6 +65,8 @@ def grid_centres(points: Floats, count: int) -> Floats:
 
 def halton(count: int, dimensions: int) -> Floats:
     """The first ``count`` points (count, d) of Halton's sequence, whose bases are the first primes, in the open unit cube (3.8)."""
+    from scipy.stats import qmc  # half a second
+
     return np.asarray(qmc.Halton(dimensions, scramble=False).fast_forward(1).random(count))
 
 

@@ -216,7 +216,13 @@ class Body:
     @property
     def rubs(self) -> bool:
         """True with friction, where a state depends on the path to it."""
-        return self.contact is not None and self.contact.friction is not None
+        return any(one is not None for one in self.frictions)
+
+    @property
+    def frictions(self) -> list[float | None]:
+        """The coefficients of friction of contact and of each pair of touching parts, None without."""
+        own = [self.contact.friction] if self.contact else []
+        return [*own, *(law.friction for law in self.touching)]
 
     @property
     def size(self) -> float:

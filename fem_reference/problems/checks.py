@@ -132,7 +132,7 @@ def _check_rest(body: Body) -> None:
             raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
     if body.contact is not None and not isinstance(body.contact, ContactLaw):
         raise InputError("contact", said(body.contact), "a ContactLaw, or None")
-    friction.check(body.contact and body.contact.friction, "contact.friction")
+    friction.check(body.frictions, begun=body.start is not None)
 
 
 def _check_cells(mesh: Any) -> None:

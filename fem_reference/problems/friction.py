@@ -1,5 +1,6 @@
 """Coulomb's friction of points on a surface: a point sticks to a place by a spring, and slides where that would pull too hard."""
 
+from collections.abc import Iterable
 from math import isfinite
 from typing import NamedTuple
 
@@ -9,14 +10,19 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 
 
-def check(friction: float | None, place: str) -> None:
-    """Raise InputError at a ``place`` where a coefficient of friction is no number above 0; None is contact without."""
-    if friction is not None and not (isfinite(friction) and friction > 0):
-        raise InputError(place, friction, "a number above 0, or None without friction")
+def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
+    """Raise InputError where a coefficient of friction is no number above 0, None without; or where there is one in a body that has
+    ``begun`` elsewhere than at rest, as nothing holds its points yet.
+    """
+    for one in (one for one in coefficients if one is not None):
+        if not (isfinite(one) and one > 0):
+            raise InputError("friction", one, "a number above 0, or None without friction")
+        if begun:
+            raise InputError("friction", one, "none in a body that does not start at rest")
 
 
 class Returned(NamedTuple):
-    """Of n points: the traction over the elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
+    """Traction of n points over their elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
     length of the elastic slip and ``by_limit`` (n,) by the limit of the traction.
     """
 

@@ -13,17 +13,18 @@ from fem_reference.problems.contact import penalty, remaining
 
 @dataclass(frozen=True)
 class Touching:
-    """Frictionless contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
+    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
     facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
-
-    ``relaxed``: two frame numbers over which an overlap at rest is removed, as that with bones is (``ContactLaw``).
+    ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
+    an overlap at rest is removed, as that with bones is.
     """
 
     one: str
     other: str
     stiffness: float
     smoothing: float
+    friction: float | None = None
     relaxed: tuple[float, float] | None = None
 
     @property

@@ -107,13 +107,15 @@ def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
     axes.fill_between(frames, low, high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
     axes.plot(frames, band.median - band.nominal, color=_SHADE, linewidth=1.2, label="median")
     if band.bar is not None:
-        look = {"facecolor": "none", "edgecolor": _SHADE, "hatch": "/////", "linewidth": 0.8}
-        axes.fill_between(frames, 0 if band.distance else -bar, bar, label="error bar", **look)
+        below = 0 if band.distance else -bar
+        axes.fill_between(
+            frames, below, bar, facecolor="none", edgecolor=_SHADE, hatch="/////", linewidth=0.8, label="error bar"
+        )
     if not band.distance:
         axes.axhline(0, color=REFERENCE, linewidth=1.5, label="the case")
-    lines = looks(one.candidate for one in found.placed)
+    look = looks(one.candidate for one in found.placed)
     for one in (one for one in found.placed if one.quantity == band.quantity):
-        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **lines[one.candidate])
+        axes.plot(frames, one.values - band.nominal, linewidth=1.0, label=one.candidate, **look[one.candidate])
     bottom, top = min(np.nanmin(low), 0 if band.distance else np.nanmin(-bar)), max(np.nanmax(high), np.nanmax(bar))
     room = _BEYOND * (top - bottom) or 1.0
     axes.set_ylim(-0.03 * room if band.distance else bottom - room / 2, top + room / (1 if band.distance else 2))

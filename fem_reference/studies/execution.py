@@ -1,7 +1,7 @@
 """The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -130,11 +130,11 @@ class Bench[C: Case]:
         """The run of the case's reference."""
         return self.obtain("reference", self.scene.reference, "reference")
 
-    def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> Iterator[Run]:
+    def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> tuple[Run, ...]:
         """The reference and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
         read = {one.name: self.read(one.name, one, place) for one, place in chosen if one.solver == "recorded"}
-        yield self.reference()
-        yield from (read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen)
+        reference = self.reference()
+        return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""

@@ -1,4 +1,4 @@
-"""Friction of bones: a block on an incline, and one under a plate that slides over it."""
+"""Friction: a block on an incline, one under a plate that slides over it, and one that slides over another."""
 
 from dataclasses import replace
 
@@ -9,9 +9,11 @@ from fem_reference.effects import make
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import ContactBone, ContactLaw
-from fem_reference.verification.parts import clamped, control, neo_hooke
+from fem_reference.problems.paths import Affine
+from fem_reference.problems.touching import Touching
+from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_hooke
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], [MPa/mm], and height [mm]
@@ -53,7 +55,38 @@ def drag(lab: Lab, friction: float) -> Finding:
     return Finding(float(along / -across), note=f"{lost:.2g} N mm are lost")
 
 
+def blocks(lab: Lab, friction: float) -> Finding:
+    """The drag of a block that slides over a larger one with an unrelated mesh, over its normal force."""
+    low, high = (
+        shapes.box(counts, size, "tetrahedron")
+        for counts, size in (((4, 3, 1), (1.0, 1.0, 0.3)), ((2, 3, 1), (0.5, 0.6, 0.3)))
+    )
+    mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0.1, 0.2, 0.299])})
+    moved = Prescribed("top", "high_z1", (0, 1, 2), Affine(NO_GRADIENT, (0.2, 0.0, 0.0)))
+    law = Touching("low_z1", "high_z0", STIFFNESS, 0.002, friction)
+    body = Body(mesh, neo_hooke(MU, BULK), (*clamped("low_z0"), moved), (0.0, 1.0), touching=(law,))
+    state = lab.solve(body, "P2/P1", first_step=0.1, residual=1e-12).last
+    along, _, across = state.forces["low_z1 on high_z0"]
+    lost = state.scalars["touching_friction_work"]
+    return Finding(float(-along / across), note=f"{lost:.2g} N mm are lost")
+
+
 ENTRIES = (
+    Entry(
+        name="sliding_blocks",
+        group="contact",
+        title="A block that slides over another: its drag over its normal force",
+        unit="",
+        measure=blocks,
+        given={"friction": FRICTION},
+        **control("friction 1 % greater", friction=1.01 * FRICTION),
+        truth=FRICTION,
+        within=2e-3,
+        relative=True,
+        because="under a pressure of a thousandth of their moduli faces tilt by as much, and their normals do",
+        kind="closed form",
+        source="Coulomb: a drag of the friction times the normal force",
+    ),
     Entry(
         name="incline",
         group="contact",

@@ -103,8 +103,8 @@ def test_what_no_surrogate_follows_has_no_sensitivities() -> None:
 
 
 def test_what_a_polynomial_misses_has_the_shares_of_a_process() -> None:
-    """A steep step in x, times 2 + y: a polynomial misses 11 % of the variance, of which 4 of 4 1/3 parts are by x alone and the rest with
-    y, whatever the step.
+    """A steep step in x, times 2 + y: a polynomial misses 11 % of the variance, of which 4 of 4 1/3 parts are by x alone and the
+    rest with y, whatever the step.
     """
     own = design(32)
     x, y = own.points.T

@@ -25,4 +25,5 @@ def test_a_key_that_is_wrong_leads_to_the_page_of_keys(tmp_path, capsys: pytest.
 def test_a_verdict_that_puzzles_leads_to_its_page_and_a_plain_one_to_none() -> None:
     assert page_of("verdict: doubtful pass") == "docs/measures.md#verdicts"
     assert page_of("verdict: inconclusive") == "docs/error_bars.md"
+    assert page_of("verdict: not judged") == "docs/measures.md#verdicts"
     assert page_of("verdict: pass") == page_of("verdict: fail") == ""

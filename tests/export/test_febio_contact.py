@@ -61,6 +61,17 @@ def test_an_overlap_at_rest_presses_with_no_more_than_the_matrix_bears(deep: flo
     assert all(f"{deep:.2g} mm inside" in text and f"search_radius is {wanted:.2g} mm" in text for text in said)
 
 
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_friction_is_exported(friction: float | None) -> None:
+    problem = overlapping(0.1)
+    acting = tuple(
+        one.model_copy(update={"friction": friction}) if one is problem.contact else one for one in problem.effects
+    )
+    contacts = list(febio.model(replace(problem, effects=acting)).iterfind("Contact/contact[@type='sliding-elastic']"))
+    assert contacts
+    assert {float(one.find("fric_coeff").text) for one in contacts} == {friction or 0.0}
+
+
 def test_a_bone_that_is_no_obstacle_may_overlap() -> None:
     """The contact of the bar is by the bone "top" alone."""
     problem = overlapping(0.5, "rests & <waits>")

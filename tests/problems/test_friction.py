@@ -35,8 +35,10 @@ def test_the_share_of_a_path_in_contact() -> None:
 
 
 def test_a_coefficient_that_is_none_is_refused() -> None:
-    check(None, "contact.friction")
-    check(0.3, "contact.friction")
+    check([None, 0.3], begun=False)
+    check([None], begun=True)
     for wrong in (0.0, -0.1, float("nan"), float("inf")):
-        with pytest.raises(InputError, match=f"contact.friction: got {wrong}, want a number above 0, or None"):
-            check(wrong, "contact.friction")
+        with pytest.raises(InputError, match=f"friction: got {wrong}, want a number above 0, or None"):
+            check([0.3, wrong], begun=False)
+    with pytest.raises(InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest"):
+        check([0.3], begun=True)

@@ -240,6 +240,8 @@ def test_a_muscle_in_situ_may_have_a_tone_and_supports_at_rest(bar: Path) -> Non
     scene = changed(bar, "effect", given)
     assert scene.effects[2].amount(0) == 0.02
     assert scene.effects[3].support == 3
+    with pytest.raises(InputError, match=r'effect\[3\].friction: got 0.3, want none beside "in_situ"'):
+        changed(bar, "effect", [*given[:3], contact | {"friction": 0.3}])
 
 
 def test_a_change_that_leads_nowhere_says_what_there_is(bar: Path) -> None:

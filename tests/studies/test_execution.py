@@ -9,6 +9,7 @@ import small
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers import recorded
 from fem_reference.studies import making
 from fem_reference.studies.execution import Bench
 
@@ -62,6 +63,15 @@ def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, cap
     caplog.clear()
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
     assert "solved before, taken from" in caplog.text
+
+
+def test_frames_are_read_before_anything_is_solved(tmp_path, monkeypatch) -> None:
+    made = bench(tmp_path)
+    monkeypatch.setattr(made, "reference", lambda: pytest.fail("solved before all input was read"))
+    (tmp_path / "frames").mkdir()
+    own = recorded.choice(tmp_path / "frames", "mm", "--candidate")
+    with pytest.raises(InputError, match="frames"):
+        made.runs([(made.scene.candidate[0], "candidate[0]"), (own, "--candidate")])
 
 
 def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:

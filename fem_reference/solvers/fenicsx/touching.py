@@ -14,8 +14,12 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.meshes import Displacement, local_facets
+from fem_reference.solvers.fenicsx.rubbing import Rubbed, Rubbing
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
+
+# With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
+_FAR = 1.0
 
 
 class TouchingForces:
@@ -32,6 +36,8 @@ class TouchingForces:
         self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
+        self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
+        self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
         self.settle()
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
@@ -57,7 +63,7 @@ class TouchingForces:
         return [one.share for one in self.passes]
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """The skin around the other part of each pass, that its points may not touch; None where there is none."""
+        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
         pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
         around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
         return [
@@ -75,12 +81,16 @@ class TouchingForces:
                     one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
                 ]
                 self.now = [(met, one.pressed(met)) for one, met in zip(self.passes, mets, strict=True)]
+                pairs = zip(self.rubbing, mets, strict=True)
+                self.rubbed = [one.rubbed(met, self.seen) if one else None for one, met in pairs]
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
         self.look()
         for _, one in self.now:
             np.subtract.at(residual, one.dofs, one.forces[:, None] * one.rows[:, 0])
+        for rubbed in filter(None, self.rubbed):
+            np.subtract.at(residual, rubbed.dofs, np.einsum("nr,nrw->nw", rubbed.pull, rubbed.rows))
         if moves is not None and moves.any():
             residual += self.tangent() @ moves
 
@@ -88,7 +98,8 @@ class TouchingForces:
         """The derivative (n, n) of the residual by the unknowns."""
         self.look()
         size, found = len(self.seen), csr_array((len(self.seen), len(self.seen)))
-        for _, one in self.now:
+        acting: list[PressedPoints | Rubbed] = [*(one for _, one in self.now), *filter(None, self.rubbed)]
+        for one in acting:
             count, five, width = one.rows.shape
             columns = np.broadcast_to(one.dofs[:, None], one.rows.shape).ravel()
             starts = np.arange(0, count * five * width + 1, width)
@@ -104,42 +115,58 @@ class TouchingForces:
         """The force (3,) [N] of each part on the other, by name, and its moment (3,) [N mm] about the origin."""
         self.look()
         found = dict[str, tuple[Floats, Floats]]()
-        for one, (met, contact) in zip(self.passes, self.now, strict=True):
+        for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
             forces = contact.forces[:, None] * met.there.normal  # on the points
             for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
+                if rubbed:  # with no moment about the points
+                    drag = sign * rubbed.pull[:, :3]
+                    turn = np.cross(met.here.point, drag).sum(axis=0)
+                    found[name] = found[name][0] + drag.sum(axis=0), found[name][1] + turn
         return found
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
-        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; and the depth of
-        the deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed.
+        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
+        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
+        the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
         removed = any(one.law.relaxed for one in self.passes)
         gaps = np.concatenate([met.gap for met, _ in self.now])
+        more = {"touching_overlap_at_rest": self.overlap} if removed else {}
+        more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
             "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
-        } | ({"touching_overlap_at_rest": self.overlap} if removed else {})
+        } | more
 
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
         self.look()
         self.settled = [met for met, _ in self.now]
+        for one, met, rubbed in zip(self.rubbing, self.settled, self.rubbed, strict=True):
+            if one and rubbed:
+                one.settle(met, rubbed.held, self.seen)
+                self.dissipated += float(rubbed.lost.sum())
+        if any(self.rubbing):
+            self.seen = np.full(len(self.seen), np.nan)  # what holds the points is another
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """Diverged where a point went through the other part since the unknowns ``before`` (n,), or past its rim."""
+        """Diverged where a point went through the other part since the unknowns ``before`` (n,), past its rim or too far."""
         self.look()
-        for one, rim, last, (met, _) in zip(self.passes, self.rims, self.settled, self.now, strict=True):
+        columns = self.passes, self.rims, self.settled, self.now, self.rubbed
+        for one, rim, last, (met, _), rubbed in zip(*columns, strict=True):
             lost, how = one.through(before, self.seen, met), "went through the other side"
             if rim and not len(lost):
                 lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
+            if rubbed and not len(lost):
+                lost, how = met.points[rubbed.far > _FAR], "slid farther than a facet within a load step"
             if len(lost):
                 where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
                 return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")

@@ -49,6 +49,26 @@ def needs_fenicsx() -> None:
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
+@pytest.mark.usefixtures("all_cores")
+def test_friction_of_a_scene_drags_and_loses_work(tmp_path) -> None:
+    # On two ranks each holds its own points.
+    rough = CONTACT.replace("[fibres]", "friction = 0.3\n\n[fibres]").replace("\n\nfriction", "\nfriction")
+    smooth, _ = solved(scene(tmp_path / "smooth", -5.5))
+    (one, _), (two, _) = (solved(scene(tmp_path / f"{ranks}", -5.5, rough), ranks) for ranks in (1, 2))
+    assert "friction_work" not in smooth[-1].scalars
+    works = [frame.scalars["friction_work"] for frame in one]
+    assert works[0] == 0
+    assert (np.diff(works) >= 0).all()
+    assert works[-1] > 0
+    assert np.linalg.norm(one[-1].forces["ball"] - smooth[-1].forces["ball"]) > 0.01 * np.linalg.norm(
+        one[-1].forces["ball"]
+    )
+    # The residual of 1e-9 N over forces of the order of 1e-2 N.
+    assert two[-1].forces["ball"] == pytest.approx(one[-1].forces["ball"], abs=1e-6)
+    assert two[-1].scalars["friction_work"] == pytest.approx(works[-1], rel=1e-4)
+
+
+@pytest.mark.usefixtures("needs_fenicsx")
 def test_contact_displaces_the_muscle(tmp_path) -> None:
     free, deep = solved(scene(tmp_path / "free", -5.5, "[fibres]"))
     pressed, shallow = solved(scene(tmp_path / "pressed", -5.5))

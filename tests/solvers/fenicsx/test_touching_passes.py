@@ -25,7 +25,7 @@ KINDS = {
 }
 
 
-def crumpled(element: str) -> tuple[TouchingForces, meshes.Displacement]:
+def crumpled(element: str, friction: float | None = None) -> tuple[TouchingForces, meshes.Displacement]:
     """Two boxes on each other with unrelated meshes, each node of them moved somewhere near."""
     kind, degree = KINDS[element]
     low, high = (
@@ -34,7 +34,7 @@ def crumpled(element: str) -> tuple[TouchingForces, meshes.Displacement]:
     )
     high.points[:] += [-0.05, -0.1, 0.49]
     mesh = shapes.joined({"low": low, "high": high})
-    law = Touching("low_z1", "high_z0", K, D)
+    law = Touching("low_z1", "high_z0", K, D, friction)
     local = meshes.distribute(MPI.COMM_SELF, mesh)
     regions = dict(zip(mesh.facets, meshes.local_facets(local, mesh.facets.values()), strict=True))
     displacement = meshes.Displacement(meshes.unknowns(local, element))
@@ -85,6 +85,41 @@ def test_forces_are_the_slope_of_the_energy_and_the_tangent_theirs(element) -> N
     assert np.abs(nodal).sum() > 1e-3
     assert nodal.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
     assert np.cross(places, nodal).sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_friction_balances_and_its_tangent_is_exact(element) -> None:
+    contact, displacement = crumpled(element, 0.3)
+    unknowns, dofs = contact.unknowns.x.array, displacement.dofs
+    forces, tangent, start = residual(contact), contact.tangent(), np.array(unknowns)
+    mets = [met for met, _ in contact.now]
+    pairs = zip(contact.passes, mets, strict=True)
+    limits = [0.3 * one.areas[met.points] * one.law.pressure(met.gap)[0] for one, met in pairs]
+    drags = [np.linalg.norm(one.pull[:, :3], axis=1) for one in contact.rubbed]
+    # On facets that bend, a force at a gap has the lever of that gap: it is another by gap times curvature.
+    bends = [met.there.metric - met.gap[:, None, None] * met.there.bend for met in mets]
+    levers = [
+        np.abs(np.linalg.eigvals(np.linalg.solve(m, met.there.metric))).max(axis=1)
+        for m, met in zip(bends, mets, strict=True)
+    ]
+    for drag, limit, lever in zip(drags, limits, levers, strict=True):
+        assert (drag <= 1.000001 * lever * limit + 1e-15).all()
+    assert all((one.lost >= 0).all() for one in contact.rubbed)
+    assert sum((one.lost > 1e-12).sum() for one in contact.rubbed) > 3
+    assert sum(((one.lost <= 1e-12) & (drag > 1e-9)).sum() for one, drag in zip(contact.rubbed, drags, strict=True)) > 0
+    direction, step, ends = np.zeros_like(unknowns), 1e-6, []
+    direction[dofs] = np.random.default_rng(2).normal(size=dofs.shape)
+    for sign in (1, -1):
+        unknowns[:] = start + sign * step * direction
+        ends.append(residual(contact))
+    # As without friction: the square of the step, and rounding over it.
+    assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(tangent @ direction, abs=1e-7)
+    unknowns[:] = start
+    nodal, places = forces[dofs], displacement.space.tabulate_dof_coordinates() + start[dofs]
+    assert nodal.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+    assert np.cross(places, nodal).sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+    sums = np.sum([np.concatenate(pair) for pair in contact.forces().values()], axis=0)
+    assert sums == pytest.approx(np.zeros(6), abs=1e-15)
 
 
 def test_points_that_face_the_same_way_do_not_meet() -> None:
