@@ -6,7 +6,7 @@ from fem_reference.effects import Interaction
 from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
-class Touching(Interaction):
+class MuscleContact(Interaction):
     """A pressure of the gap between two muscles, on both alike; see ``fem_reference.problems.touching.Touching`` for the law.
 
     ``stiffness`` [MPa/mm]: under the pressure p the two overlap by at most p / stiffness. ``smoothing`` [mm]: the distance below

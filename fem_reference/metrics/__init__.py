@@ -176,9 +176,9 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if reference.fibres is None:
         place = f"{reference.name}: fibres"
         raise InputError(place, "a run without an interior", "a reference that carries the fibres")
-    assert isinstance(setup, Setup)  # of one muscle: those of several are measured each by itself
-    context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt, setup.joints)
-    return replace(context, ends=attached_ends(setup.attached, context.exempt, reference.fibres))
+    own = cast("Setup", setup)  # of one muscle: those of several are measured each by itself
+    context = MeasurementContext.of(reference, reference.fibres, own.bones, own.exempt, own.joints)
+    return replace(context, ends=attached_ends(own.attached, context.exempt, reference.fibres))
 
 
 class Metric(Protocol):

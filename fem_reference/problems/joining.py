@@ -28,7 +28,7 @@ def called(piece: str, name: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class DirectionsByPiece:
     """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; x where one has none."""
 
     ranges: tuple[Range, ...]
@@ -78,7 +78,7 @@ def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Bod
         effects,
         tuple(_prescribed(bodies, ranges)),
         _frames(bodies, touching),
-        fibre=Along(tuple(ranges.values()), tuple(one.fibre for one in bodies.values())),
+        fibre=DirectionsByPiece(tuple(ranges.values()), tuple(one.fibre for one in bodies.values())),
         contact=_contact(bodies, ranges),
         bones=some.bones,
         interval=some.interval,

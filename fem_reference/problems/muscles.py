@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fem_reference.effects.touching import Touching as TouchingEffect
+from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Indicator
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
@@ -78,7 +78,7 @@ class MusclesProblem:
 
     problems: dict[str, MuscleProblem]
     pairs: tuple[tuple[str, str], ...]
-    law: TouchingEffect | None
+    law: MuscleContact | None
     apart: bool
 
     task: ClassVar[Task] = "solve"
@@ -183,7 +183,7 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
     """The problem of all muscles, each filled with tetrahedra and fibres."""
     parts = zip(rest.muscles.items(), case.parts, strict=True)
     known = [*case.effect, *(one.effect for one in case.decisions)]
-    apart = any(isinstance(one, TouchingEffect) for one in known)
+    apart = any(isinstance(one, MuscleContact) for one in known)
     return MusclesProblem(
         {name: muscle.build(part, one) for (name, one), part in parts}, rest.pairs, case.touching, apart
     )
@@ -226,7 +226,7 @@ def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
-        if isinstance(effect, TouchingEffect):
+        if isinstance(effect, MuscleContact):
             every.append(_touches(case, rest, effect))
             continue
         asked = [one for some in found for one in some if one.effect is effect]
@@ -234,7 +234,7 @@ def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
     return tuple(every)
 
 
-def _touches(case: MusclesCase, rest: MusclesSetup, effect: TouchingEffect) -> Decision:
+def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> Decision:
     """The decision on contact between muscles, by the least clearance of two."""
     known = estimates(case.parts[0], next(iter(rest.muscles.values())))
     pairs = list(combinations(rest.muscles, 2))

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field
 
 from fem_reference.effects import Effect
-from fem_reference.effects.touching import Touching
+from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Name, join
 from fem_reference.scenes.case import Case, Expectation
@@ -51,9 +51,9 @@ class MusclesCase(Case):
         return self.frames.numbers
 
     @property
-    def touching(self) -> Touching | None:
+    def touching(self) -> MuscleContact | None:
         """The contact between the muscles, None without."""
-        return next((one for one in self.effect if isinstance(one, Touching)), None)
+        return next((one for one in self.effect if isinstance(one, MuscleContact)), None)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -94,7 +94,7 @@ class MusclesCase(Case):
 
     def _parts(self) -> Iterator[MuscleCase]:
         """The cases, which were checked as this one was read."""
-        everywhere = tuple(one for one in self.effect if not isinstance(one, Touching))
+        everywhere = tuple(one for one in self.effect if not isinstance(one, MuscleContact))
         for i, muscle in enumerate(self.muscle):
             own = {name: getattr(muscle, name) for name in BESIDE}
             alone = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Run, complete
 from fem_reference.runs.views import run_of
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
 
@@ -37,7 +36,7 @@ class ByMuscle:
         return [dict(zip(names, row, strict=True)) for row in self.worst]
 
 
-def views(bench: Bench[Any], run: Run) -> dict[str, Run]:
+def views(bench: Bench[Case], run: Run) -> dict[str, Run]:
     """The ``run`` of several muscles as one of each, by name."""
     problem, parts = bench.problem(), bench.parts
     assert isinstance(problem, MusclesProblem)
@@ -45,7 +44,7 @@ def views(bench: Bench[Any], run: Run) -> dict[str, Run]:
     return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
 
 
-def compared(bench: Bench[Any], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
+def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
     """The comparison of each muscle of a case of several: with the one reference of all, and with candidates that solve it alone.
     Frames are read from folders with the names of the muscles; a candidate may lack some.
     """

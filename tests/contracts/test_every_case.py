@@ -122,6 +122,20 @@ def test_the_page_of_the_octave_examples(tmp_path, monkeypatch) -> None:
     assert page.count("<h2") > len(facts["cases"])
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("without_page")
+@pytest.mark.parametrize("name", MUSCLES)
+def test_several_muscles_meet_their_expectations_and_fail_with_their_negative_control(
+    name, tmp_path, monkeypatch
+) -> None:
+    for control, status, word in ((False, cli.DONE, "pass"), (True, cli.VERDICT_FAIL, "fail")):
+        scene = casefile.read(name, changes=quickly(name) | {"frames.every": 20}, with_negative_control=control)
+        found, facts = run(scene, tmp_path / word, monkeypatch, verb="compare")
+        assert found == status
+        assert {one["verdict"] for one in facts["muscles"].values()} == {word}
+        assert {one["solver"] for one in facts["penetration"]} == {"reference", *(one.name for one in scene.candidate)}
+
+
 @pytest.fixture
 def without_page(monkeypatch) -> None:
     """Numbers alone are made: the page of the main job is looked at."""

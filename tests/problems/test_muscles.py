@@ -10,9 +10,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.io import files
 from fem_reference.problems import muscles, of_case
-from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Outcome, collected
-from fem_reference.runs.views import frame_of, run_of
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import judging
@@ -69,7 +67,7 @@ def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
     for slide, near in ((1, False), (3, True)):
         case = of_case.chosen(case_of(folder, effects="auto", slide=slide))
         assert (case.touching is not None) is near
-        said = next(str(one) for one in case.decisions if one.effect.title == "Touching")
+        said = next(str(one) for one in case.decisions if one.effect.title == "MuscleContact")
         assert ("left out" in said) is not near
         rest = of_case.setup(case_of(folder, slide=slide))
         assert rest.pairs == ((("a", "b"),) if near else ())
@@ -80,7 +78,7 @@ def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
 def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
     case = case_of(folder)
     problem = of_case.problem(case, of_case.setup(case))
-    body, rest, (a, b) = problem.body, problem.rest, problem.spans
+    body, rest, b = problem.body, problem.rest, problem.spans[1]
     assert [effect.title for effect in body.effects] == ["NeoHooke", "Incompressible", "Viscosity in b"]
     first, last = body.within["b"]
     assert body.mesh.points[body.mesh.cells[first:last]][..., 0].min() == 15
@@ -88,36 +86,6 @@ def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
     assert {"a low", "a free", "b top"} <= set(body.mesh.facets)
     assert rest.surface.points[b.vertices] == pytest.approx(problem.problems["b"].surface.points)
     assert rest.mesh.points[rest.mesh.tets[b.cells]].reshape(-1, 3)[:, 0].min() == 15
-    state = NodalState(
-        np.arange(len(rest.mesh.tets))[:, None, None] * np.ones((1, 10, 3)),
-        np.zeros((len(rest.mesh.tets), 4)),
-        np.zeros((0, 0, 3)),
-    )
-    forces = {
-        "a low": np.ones(3),
-        "b low": 2 * np.ones(3),
-        "b free on a free": 3 * np.ones(3),
-        "a free on b free": 4 * np.ones(3),
-    }
-    frame = Frame(
-        0,
-        rest.surface.points,
-        rest.fibres.points,
-        rest.mesh.points,
-        {"energy": 1.0, "b.volume": 2.0, "b": 3.0},
-        state=state,
-        forces=forces,
-    )
-    own = frame_of(frame, b, ("a",))
-    assert {name: force[0] for name, force in own.forces.items()} == {"low": 2, "a": 4}
-    assert {name: force[0] for name, force in frame_of(frame, a, ("b",)).forces.items()} == {"low": 1, "b": 3}
-    assert own.state.displacement[0, 0, 0] == len(problem.problems["a"].mesh.tets)
-    run = run_of(collected([frame], Outcome("converged", ""), rest), problem, "b")
-    assert run.positions[0] == pytest.approx(problem.problems["b"].surface.points)
-    assert {name: values[0] for name, values in run.scalars.items()} == {
-        "volume": 2.0,
-        "b": 3.0,
-    }  # and no energy of both
 
 
 def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) -> None:

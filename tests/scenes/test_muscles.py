@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fem_reference.effects.touching import Touching
+from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscles import MusclesCase
@@ -55,8 +55,8 @@ def test_each_of_several_is_the_case_that_it_is_alone(bar: Path) -> None:
     }
     assert a.model_copy(update={key: getattr(plain, key) for key in alone}) == plain
     assert [type(one).__name__ for one in b.effects] == ["NeoHooke", "Incompressible", "Viscosity"]
-    assert isinstance(case.touching, Touching)
-    assert list(case.acting) == ["NeoHooke", "Incompressible", "Touching", "b: Viscosity"]
+    assert isinstance(case.touching, MuscleContact)
+    assert list(case.acting) == ["NeoHooke", "Incompressible", "MuscleContact", "b: Viscosity"]
 
 
 def test_the_key_changes_with_each_muscle_and_not_with_what_is_expected(bar: Path) -> None:
