@@ -171,11 +171,13 @@ class Pass:
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
         """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) and feel nothing:
-        those that were ``pressed`` before on a part beside it, and any at depth. Those that ``met`` a part feel it.
+        those that were ``pressed`` before on a part beside it, and any at depth. Those that ``met`` a part feel it; a point above
+        the part may be behind a wall of it, but is beyond the wall's edge.
         """
         near = self.met(now, self.law.smoothing)
         facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
-        lost = (np.isin(near.points, pressed) & facing) | (near.gap < -self.law.smoothing)
+        deep = (near.gap < -self.law.smoothing) & (self.other.beyond(near.there.at) <= 0)
+        lost = (np.isin(near.points, pressed) & facing) | deep
         return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
     def _passed(self, starts: Floats, ends: Floats, old: Floats, new: Floats, free: Floats) -> Ints:
