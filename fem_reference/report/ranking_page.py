@@ -86,8 +86,8 @@ def _row(one: SolverResult) -> dict[str, Any]:
         worst[f"{metric}.{statistic}"] = found and {"value": finite(found[0]), "frame": found[1], "unit": unit}
     named = {name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")}
     ended = {"status": one.outcome.status, "message": one.outcome.message}
-    ended["seconds_processor"] = one.outcome.cost.get("seconds_processor")
-    return {**named, "needs": dict(one.needs), **ended, "worst": worst}
+    spent = {"seconds_processor": one.outcome.cost.get("seconds_processor")}
+    return {**named, "needs": dict(one.needs), **ended, **spent, "worst": worst}
 
 
 def _drawing(table: Table) -> Drawing:
