@@ -193,9 +193,11 @@ COUNTS = (
 LINES = 36_000
 ADDED = {
     "forces and moment arms, Hill's muscle, decompositions into fibres, estimation, rbf_muscle, viper": 3550,
-    "experiments, credibility, tension at rest, unknown parameters, calibration": 3810,
+    "experiments, credibility, tension at rest, unknown parameters, calibration": 3940,
     "regions, membranes, tendons that pull": 880,
     "contact between parts of the surface": 740,
+    "several muscles in one scene": 1080,
+    "friction": 590,
     "own solvers as commands, load of the machine, answers first": 880,
 }
 
