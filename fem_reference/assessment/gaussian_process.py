@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
-from scipy.stats import qmc
 
 from fem_reference.foundations.mesh import Floats
 
@@ -54,6 +53,8 @@ class GaussianProcess:
     @cached_property
     def _shares(self) -> Floats:
         """The shares (2, d), by samples of two independent points in which one variable at a time is exchanged."""
+        from scipy.stats import qmc  # half a second, for what is asked of few processes
+
         variables = self.points.shape[1]
         both = 2 * qmc.Sobol(2 * variables, rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1
         one, other = both[:, :variables], both[:, variables:]

@@ -20,6 +20,7 @@ DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 BROKEN = 70
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
+_CHECKOUT = Path(__file__).resolve().parents[2]  # or the folder that the package is installed in
 
 
 def entry() -> None:
@@ -30,6 +31,7 @@ def entry() -> None:
 
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
+    options = argparse.Namespace(quiet=False)
     try:
         words = [word for word in arguments if not word.startswith("-")]
         options = parser(words[0] if words else "").parse_args(arguments)
@@ -41,7 +43,7 @@ def main(arguments: list[str]) -> int:
         status: int = options.verb(options)
     except (InputError, OSError, MissingSoftware) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
-        _explain(str(error).partition("\n")[0])
+        _explain(str(error).partition("\n")[0], options)
         return SOLVER_FAILED if isinstance(error, MissingSoftware) else BAD_INPUT
     except KeyboardInterrupt:
         said = "interrupted; what is stored stays, and a run of the reference goes on next time"
@@ -55,9 +57,10 @@ def main(arguments: list[str]) -> int:
     return status
 
 
-def _explain(message: str) -> None:
-    """Name the page of the documentation that explains a message."""
-    if found := page_of(message):
+def _explain(message: str, options: argparse.Namespace) -> None:
+    """Name the page of the documentation that explains a message, in a checkout, which has it."""
+    found = page_of(message)
+    if found and not options.quiet and (_CHECKOUT / found.partition("#")[0]).exists():
         print(f"see {found}", file=sys.stderr)
 
 
@@ -122,8 +125,7 @@ def out(options: argparse.Namespace) -> Path:
 def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
     """Print ``text``, and write ``facts`` as JSON where that is wanted."""
     print(text)
-    if not options.quiet:
-        _explain(text)
+    _explain(text, options)
     if options.json is not None:
         write(options.json, json.dumps(facts, indent=1, allow_nan=False))
 

@@ -1,14 +1,16 @@
 """Pages of the documentation that explain messages: the few that a reader of such a message would want."""
 
-# What stands in a message, and the page beside it; the first that fits. Without one a message says all that there is.
+import re
+
+# Patterns in a message, each with its page; the first that fits. Without one a message says all that there is.
 PAGES = (
     ("FEniCSx is not installed", "getting_started.md"),
     ("--solver-command", "your_own_solver.md#your-solver-as-a-command"),
     ("--candidate", "your_own_solver.md"),
-    ("candidate.toml", "your_own_solver.md"),
-    (".toml: effect", "effects.md"),
-    (".toml: region", "effects.md#regions"),
-    (".toml: ", "scene_keys.md"),
+    (r"candidate\.toml", "your_own_solver.md"),
+    (r"\.toml: (muscle\[\d+\]\.)?effect", "effects.md"),
+    (r"\.toml: (muscle\[\d+\]\.)?region", "effects.md#regions"),
+    (r"case\.toml: ", "scene_keys.md"),
     (": crashed, ", "your_own_solver.md#your-solver-as-a-command"),
     ("verdict: not judged", "measures.md#verdicts"),
     ("verdict: doubtful pass", "measures.md#verdicts"),
@@ -23,4 +25,4 @@ def page_of(message: str) -> str:
     >>> page_of('case.toml: effect[0].mu: got "1 mm", want a pressure')
     'docs/effects.md'
     """
-    return next((f"docs/{name}" for words, name in PAGES if words in message), "")
+    return next((f"docs/{name}" for words, name in PAGES if re.search(words, message)), "")

@@ -27,3 +27,9 @@ def test_a_verdict_that_puzzles_leads_to_its_page_and_a_plain_one_to_none() -> N
     assert page_of("verdict: inconclusive") == "docs/error_bars.md"
     assert page_of("verdict: not judged") == "docs/measures.md#verdicts"
     assert page_of("verdict: pass") == page_of("verdict: fail") == ""
+
+
+def test_the_effects_and_regions_of_one_of_several_muscles_have_the_same_pages() -> None:
+    assert page_of('a/case.toml: muscle[1].effect[0].mu: got "1 mm", want a pressure') == "docs/effects.md"
+    assert page_of("a/case.toml: muscle[1].region[0].width: got 0") == "docs/effects.md#regions"
+    assert page_of("meshes/a/card.toml: licence: got nothing") == ""

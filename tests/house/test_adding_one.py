@@ -167,7 +167,13 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 
 
 SOLVES = (
-    MuscleSolver(settings=Settings, solve=solve, example=_SETTINGS, table=(TableRow("PBD", "own_solver", _SETTINGS),)),
+    MuscleSolver(
+        settings=Settings,
+        solve=solve,
+        example=_SETTINGS,
+        depends_on=("order",),
+        table=(TableRow("PBD", "own_solver", _SETTINGS),),
+    ),
 )
 '''.lstrip()
 

@@ -39,6 +39,7 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "verdict",
         "doubts",
         "second_check",
+        "mesh",
         "cost",
         "measures",
         "from_rest",
