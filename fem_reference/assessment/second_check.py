@@ -12,6 +12,7 @@ from fem_reference.assessment import neighbours, run_checks
 from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
+from fem_reference.geometry import interpenetration
 from fem_reference.io.texts import plain
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
@@ -37,7 +38,8 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> Run:
     """A converged ``run`` with its second check in the origin, stored with it; unchanged where it has the check of this code."""
-    stored, code = run.origin.get(RECORD, {}), hashlib.sha256(Path(run_checks.__file__).read_bytes()).hexdigest()[:16]
+    sources = b"".join(Path(str(one.__file__)).read_bytes() for one in (run_checks, neighbours, interpenetration))
+    stored, code = run.origin.get(RECORD, {}), hashlib.sha256(sources).hexdigest()[:16]
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)

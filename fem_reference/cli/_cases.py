@@ -190,9 +190,11 @@ def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: li
         facts["muscles"][name] = report.summary(result)
     facts["penetration"], word = found.penetration, judge.overall(result.word for result in found.muscles.values())
     texts += [
-        f"{who}: {one} and {other} in each other by {depth:.3g} mm (frame {frame})"
+        f"{who}: {one} and {other} penetrate each other by {depth:.3g} mm (frame {frame})"
         for who, one, other, depth, frame in found.worst
     ]
+    texts += [f"{who}: no frames of {muscle}, which is not judged" for who, muscle in found.lacking]
+    facts["lacking"] = [{"solver": who, "muscle": muscle} for who, muscle in found.lacking]
     write_output(facts, "\n".join([*texts, by_muscle.ALONE, *unturned(options, word)]), options)
     for name, result in found.muscles.items():
         wanted = asked("compare", case, options, f"report_{name}", *who)

@@ -28,6 +28,8 @@ from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.touching import Touching
 from fem_reference.scenes.muscles import MusclesCase
 
+_BETWEEN = 8  # looks at a moving bone from one stop to the next
+
 
 @dataclass(frozen=True)
 class Span:
@@ -211,14 +213,21 @@ def _apart(one: Surface, other: Surface) -> float:
 
 
 def _travel(rest: Setup) -> float:
-    """The greatest path [mm] of a point of the muscle with any of the bones that it is attached to."""
-    points, bones = rest.surface.points, {one.bone for one in rest.attached}
+    """The greatest path [mm] of a point of the muscle with any bone, at its frames, at keyframes, and in between."""
+    points = rest.surface.points
     moved = [
         np.linalg.norm(apply(bone.pose(frame), points) - points, axis=1).max()
-        for bone in bones
-        for frame in rest.frames
+        for bone in rest.bones
+        for frame in (_instants(bone, rest.frames) if bone.motion else ())
     ]
     return float(max(moved, default=0.0))
+
+
+def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
+    """Frame numbers at which a bone is looked at: the ``frames``, its keyframes among these, and some between each two."""
+    assert bone.motion is not None  # called for moving bones only
+    stops = sorted({*map(float, frames), *(one for one in bone.motion.frames if frames[0] <= one <= frames[-1])})
+    return np.interp(np.linspace(0, len(stops) - 1, _BETWEEN * (len(stops) - 1) + 1), np.arange(len(stops)), stops)
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:

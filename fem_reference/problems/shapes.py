@@ -122,6 +122,8 @@ def joined(pieces: Mapping[str, Cells]) -> Cells:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
     starts = dict(zip(pieces, np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), strict=False))
     named = {f"{name}_{on}": starts[name] + f for name, mesh in pieces.items() for on, f in mesh.facets.items()}
+    if len(named) < sum(len(mesh.facets) for mesh in meshes):
+        raise InputError("pieces", f"two regions of one name among {', '.join(named)}", "names that differ once joined")
     cells = np.concatenate([starts[name] + mesh.cells for name, mesh in pieces.items()])
     return Cells(np.concatenate([mesh.points for mesh in meshes]), cells, *kinds.pop(), named)
 

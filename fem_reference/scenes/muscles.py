@@ -82,6 +82,12 @@ class MusclesCase(Case):
             "muscle": [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
         }
 
+    @property
+    def decides(self) -> list[Any]:
+        """Causes of verdicts, as of one muscle; what is expected of a muscle is none."""
+        judged = self.model_copy(update={"expect": tuple(one for muscle in self.muscle for one in muscle.expect)})
+        return [self.determining(), *super(MusclesCase, judged).decides[1:]]
+
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
         """The case that expects ``more`` of each muscle."""
         muscles = (one.model_copy(update={"expect": (*one.expect, *more)}) for one in self.muscle)

@@ -23,11 +23,12 @@ ALONE = "Each candidate solves each muscle by itself: it knows nothing of the ot
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
     """Comparisons of the ``muscles`` of a case by name. ``worst``: for each solver that has two of them, the solver, the two, the
-    greatest depth [mm] to which they are in each other, and its frame.
+    greatest depth [mm] to which they are in each other, and its frame. ``lacking``: candidates and muscles without frames of them.
     """
 
     muscles: dict[str, Comparison]
     worst: tuple[tuple[str, str, str, float, int], ...]
+    lacking: tuple[tuple[str, str], ...]
 
     @property
     def penetration(self) -> list[dict[str, object]]:
@@ -62,7 +63,10 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
         for run in solved:
             runs.setdefault(run.name, {})[name] = complete(run, part.scene.numbers)
         found[name] = judging.compare(part, whole[name], solved)
-    return ByMuscle(found, tuple(_worst(runs)))
+    lacking = tuple(
+        (entry.name, name) for entry, place in chosen for name in parts if _own((entry, place), name) is None
+    )
+    return ByMuscle(found, tuple(_worst(runs)), lacking)
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:

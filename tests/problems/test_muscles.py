@@ -99,3 +99,16 @@ def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) 
     rest = collected([Frame(0, bench.problem().rest.surface.points)], Outcome("converged", ""), bench.problem().rest)
     with pytest.raises(InputError, match="a comparison of several muscles as one"):
         judging.compare(bench, rest, [])
+
+
+def test_a_motion_there_and_back_between_frames_counts(folder: Path) -> None:
+    """The lid slides by 3 mm up to frame 1, and is back at frame 2, where alone it would have to be looked at."""
+    scene = text().replace(
+        '{ frame = 2, distance = "2 mm" }', '{ frame = 1, distance = "3 mm" }, { frame = 2, distance = "0 mm" }'
+    )
+    (folder / "case.toml").write_text(scene.replace("every = 1", "every = 2"))
+    rest = of_case.setup(casefile.read(folder))
+    (folder / "case.toml").write_text(scene.replace('"3 mm"', '"0 mm"').replace("every = 1", "every = 2"))
+    still = of_case.setup(casefile.read(folder))
+    far, near = (muscles.clearance(*one.muscles.values()) for one in (still, rest))
+    assert far - near == pytest.approx(6.0, abs=1e-9)  # each may come nearer by 3 mm

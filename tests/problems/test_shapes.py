@@ -1,6 +1,7 @@
 """Structured bodies: their cells fit, are upright and have the closed forms' volumes and areas."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -294,6 +295,14 @@ def test_an_octant_of_a_ball_has_its_volume_and_grows_evenly(kind: Kind) -> None
     layers = np.diff(on_axis[on_axis > 1 - 1e-9])
     assert layers[1:] / layers[:-1] == pytest.approx(layers[1] / layers[0], rel=1e-9)
     assert layers[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_joined_pieces_do_not_share_the_name_of_a_region() -> None:
+    """One called a with its b_x0, one called a_b with its x0."""
+    one = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "hexahedron")
+    other = replace(one, facets={f"b_{name}": facets for name, facets in one.facets.items()})
+    with pytest.raises(InputError, match="two regions of one name among a_b_x0"):
+        shapes.joined({"a": other, "a_b": one})
 
 
 def test_joined_pieces_stay_apart_and_keep_their_regions() -> None:

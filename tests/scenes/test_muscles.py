@@ -102,3 +102,10 @@ def test_what_is_for_one_muscle_is_refused_for_several(bar: Path) -> None:
     case = casefile.read(written(bar, several(nested("a"), nested("b"))))
     with pytest.raises(InputError, match="a case of several muscles, want the case of a muscle"):
         casefile.muscle(case)
+
+
+def test_what_is_expected_of_a_muscle_is_no_cause_of_its_verdict(bar: Path) -> None:
+    case = casefile.read(written(bar, several(nested("a"), nested("b")) + TOUCHING))
+    assert all(muscle.expect for muscle in case.muscle)
+    none = case.model_copy(update={"muscle": tuple(one.model_copy(update={"expect": ()}) for one in case.muscle)})
+    assert none.decides[:2] == case.decides[:2]

@@ -42,9 +42,13 @@ class TouchingForces:
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
         ]
-        for law, depth in [*depths, *((law, overlap(body, law)) for law in body.touching if not law.relaxed)]:
-            if depth > law.smoothing and not law.relaxed:
-                raise ArithmeticError(f'"{law.one}" and "{law.other}" overlap by {depth:.3g} mm')
+        for law in body.touching:
+            seen = max(depth for one, depth in depths if one is law)
+            deep, most = max(seen, overlap(body, law)), law.smoothing + (max(seen, 0.0) if law.relaxed else 0.0)
+            if deep > most:  # what contact does not see is not removed either
+                raise ArithmeticError(
+                    f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm, at most {most:.3g} mm may'
+                )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
             if one.law.relaxed:
