@@ -50,15 +50,17 @@ Vary = Callable[[MuscleCase], MuscleCase]
 def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
     """Changes by name that each halve one cause of numerical error beside tetrahedra: the compliance and smoothing of contact, and
     the error and rounding of distances to bones, unless no bone ``pressed``; load steps, where the ``settings`` have them, with
-    drag or viscosity only: else a state does not depend on them.
+    drag, viscosity or friction only: else a state does not depend on them.
     """
     found, contact = dict[str, Vary](), among(case.effects)
+    rubs = contact is not None and contact.friction is not None and pressed
     if contact is not None and pressed:
         found["contact stiffness"] = partial(with_contact, stiffness=2 * contact.stiffness)
         found["contact smoothing"] = partial(with_contact, smoothing=contact.smoothing / 2)
         if any(bone.surface for bone in case.bone):
             found["distances to bones"] = lambda one: with_distances(one, 0.5, "distance_error", "distance_rounding")
-    if any("interval" in effect.needs for effect in case.effects) and "largest_step" in solvers.trades(type(settings)):
+    timed = any("interval" in effect.needs for effect in case.effects)
+    if (timed or rubs) and "largest_step" in solvers.trades(type(settings)):
         found["load steps"] = half_steps(case, settings)
     return found
 
@@ -242,7 +244,9 @@ def sharper_problem(
     """A sharper problem: the body, indices of the points of ``body`` among its own, changes of the settings, and these in words."""
     changes: dict[str, float | str | None] = {"store_state": False}
     said = ""
-    if any("interval" in effect.needs for effect in body.effects):  # else a state does not depend on load steps
+    if body.rubs or any(
+        "interval" in effect.needs for effect in body.effects
+    ):  # else a state does not depend on load steps
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
         changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
         said = " and load steps of half the length"

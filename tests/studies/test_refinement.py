@@ -299,3 +299,12 @@ def test_a_finer_scene_has_every_cause_of_error_halved(case) -> None:
     assert [bone.distance_rounding for bone in finer.bone] == [0.5, 0.5]
     unpressed = replace(reference, scalars={"contact_area": np.zeros(5)})
     assert refinement.finer(bench, unpressed, 0.8).effects == scene.effects
+
+
+def test_with_friction_a_state_depends_on_load_steps() -> None:
+    case = casefile.read("hip_flexion")
+    laws = [one.model_copy(update={"friction": 0.3}) if one.title == "Contact" else one for one in case.effect]
+    rubbed = case.model_copy(update={"effect": tuple(laws)})
+    assert "load steps" not in refinement.variations(case, Settings())
+    assert "load steps" in refinement.variations(rubbed, Settings())
+    assert "load steps" not in refinement.variations(rubbed, Settings(), pressed=False)
