@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks
+from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, worst
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.geometry.skins import edge_lengths
@@ -37,13 +37,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
             allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
             name = f"{pair[0].name} and {pair[1].name} in each other"
             checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))
-    return tuple(_worst(checks))
-
-
-def _worst(checks: list[RunCheck]) -> Iterator[RunCheck]:
-    """The check of each name that comes nearest to its allowed value."""
-    for name in dict.fromkeys(one.name for one in checks):
-        yield max((one for one in checks if one.name == name), key=lambda one: one.share)
+    return worst(checks)
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:

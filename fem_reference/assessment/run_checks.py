@@ -83,7 +83,7 @@ def of_body(body: Body, solved: Run) -> RunChecks:
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
-    return (*found, *_worst(chain(_prescribed(body, solved), _overlaps(body, solved))))
+    return (*found, *worst(chain(_prescribed(body, solved), _overlaps(body, solved))))
 
 
 def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
@@ -124,10 +124,10 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
     crossed = chain(_depths(problem, run, nodes), _creases(run))
-    return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
+    return (*found, *worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
 
 
-def _worst(checks: Iterable[RunCheck]) -> RunChecks:
+def worst(checks: Iterable[RunCheck]) -> RunChecks:
     """For each name, the check that comes nearest to its allowed value, or exceeds it most."""
     found = dict[str, RunCheck]()
     for one in checks:

@@ -50,22 +50,20 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
     Frames are read from folders with the names of the muscles; a candidate may lack some.
     """
     parts, found = bench.parts, dict[str, Comparison]()
-    for entry, place in chosen:
-        if all(_own((entry, place), name) is None for name in parts):
+    own = {name: [_own(one, name) for one in chosen] for name in parts}
+    for i, (entry, place) in enumerate(chosen):
+        if all(given[i] is None for given in own.values()):
             want = f"folders {' or '.join(parts)} in it, with the frames of these muscles"
             raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
     reference = bench.reference()
     whole = views(bench, reference)
     runs: dict[str, dict[str, Run]] = {"reference": whole}
     for name, part in parts.items():
-        own = [one for one in (_own(entry, name) for entry in chosen) if one is not None]
-        solved = [part.obtain(entry.name, entry, place) for entry, place in own]
+        solved = [part.obtain(entry.name, entry, place) for entry, place in filter(None, own[name])]
         for run in solved:
             runs.setdefault(run.name, {})[name] = complete(run, part.scene.numbers)
         found[name] = judging.compare(part, whole[name], solved)
-    lacking = tuple(
-        (entry.name, name) for entry, place in chosen for name in parts if _own((entry, place), name) is None
-    )
+    lacking = tuple((entry.name, name) for i, (entry, _) in enumerate(chosen) for name in parts if own[name][i] is None)
     return ByMuscle(found, tuple(_worst(runs)), lacking)
 
 
