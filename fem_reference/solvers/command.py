@@ -241,10 +241,10 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
     missing or damaged.
     """
-    kept, trouble, cost = 0, None, _cost(problem, settings, ended)
+    kept, trouble, cost, lacks = 0, None, _cost(problem, settings, ended), ""
     try:
         said = recorded.checked_about(out, settings.unit)
-        unit = settings.unit or length_unit(said.unit or "mm")
+        unit, lacks = settings.unit or length_unit(said.unit or "mm"), said.lacks
         for frame in recorded.checked_frames(problem, out, unit):
             sink(frame)
             kept += 1
@@ -264,7 +264,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
         failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
         why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
         return Outcome(failed, f"exit status 0, but {why}; {reached}", cost)
-    return Outcome("converged", f"{kept} frames in {took}", cost)
+    return Outcome("converged", f"{kept} frames in {took}{lacks}", cost)
 
 
 def _cost(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended) -> dict[str, float]:

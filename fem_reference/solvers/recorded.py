@@ -53,8 +53,8 @@ class RecordedSettings(Record):
 
 
 class About(Record):
-    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, and the time [s] that solving one frame
-    took on so many threads.
+    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
+    on so many threads, and in words what of the scene was ``left_out``.
     """
 
     name: FileName | None = None
@@ -62,6 +62,12 @@ class About(Record):
     unit: str | None = None
     seconds_per_frame: float | None = Field(default=None, gt=0)
     threads: int | None = Field(default=None, gt=0)
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def lacks(self) -> str:
+        """The end of a sentence with what was left out; empty where nothing was."""
+        return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
     @classmethod
@@ -110,7 +116,7 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
     for frame in frames:
         sink(frame)
     cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
-    message = f"read {len(frames)} frames from {_source(folder)}"
+    message = f"read {len(frames)} frames from {_source(folder)}{said.lacks}"
     return Outcome("converged", message, {key: float(cost[key]) for key in cost})
 
 
