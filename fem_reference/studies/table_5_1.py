@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Iterable
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
+from fem_reference.assessment.soundness import unsound
 from fem_reference.effects.contact import among
 from fem_reference.foundations.records import Record
 from fem_reference.metrics import Measure, MeasurementContext, context_of, in_tables, measure
@@ -81,9 +83,12 @@ def _on(
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))
         run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
         measures = measure(run, reference, context, METRICS)
-        results.append(_result(scene, kind, run, measures, needs(scene, candidate, context)))
+        found = _result(scene, kind, run, measures, needs(scene, candidate, context))
+        results.append(replace(found, unsound=unsound(run, reference)))
     foreign = foreign + [complete(bench.obtain(one.name, one, "--solver-command"), scene.numbers) for one in commands]
-    results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {}) for run in foreign]
+    for run in foreign:
+        found = _result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {})
+        results.append(replace(found, unsound=unsound(run, reference)))
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
 
