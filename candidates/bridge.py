@@ -1,8 +1,8 @@
 """Shared part of solvers of other people: it reads an exported scene in SI units, moves its bones, and writes the frames.
 
-A candidate is a class with ``takes`` (names of effects that it has beside its law), ``step(held, bones)`` and ``positions()``;
-``main`` runs it. Its file states law, element, contact, threads, units and what it cannot take. What it leaves out of a scene
-is printed, and kept in the ``candidate.toml`` beside the frames. Only numpy and meshio are needed here.
+A candidate is a class with ``step(held, bones)``, ``positions()`` and ``lost``; ``main`` runs it. Its file states law, element,
+contact, threads, units and what it cannot take; the ``candidate.toml`` beside it the effects that it ``takes`` beside its law.
+What it leaves out of a scene is printed, and kept in the ``candidate.toml`` beside the frames. It needs numpy and meshio.
 """
 
 import argparse
@@ -11,6 +11,7 @@ import json
 import os
 import sys
 import time
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -182,7 +183,8 @@ def main(make: Any, version: str, **kinds: type) -> None:
     folder, out, steps = given.pop("scene"), given.pop("out"), given.pop("steps")
     scene = read(folder)
     skin, solver = Skin(folder, scene), make(scene, **given)
-    left_out = [effect for effect in scene.effects if effect not in (*LAW, *make.takes)] + list(solver.lost)
+    takes = tomllib.loads(Path(sys.argv[0]).with_name("candidate.toml").read_text()).get("takes", [])
+    left_out = [effect for effect in scene.effects if effect not in (*LAW, *takes)] + list(solver.lost)
     spent = drive(solver, scene, steps, lambda frame, points: skin.write(out / f"frame_{frame:04d}.ply", points))
     numbers = scene.frames[-1] - scene.frames[0]
     about = f'version = "{version}"\nunit = "mm"\nseconds_per_frame = {spent / numbers:.6g}\nthreads = 1\n'

@@ -22,7 +22,6 @@ def _text(numbers: np.ndarray) -> str:
 class Flex:
     """A flex of one body with three slides for each vertex."""
 
-    takes = ()
     lost = ()
 
     def __init__(self, scene: Scene, poisson: float) -> None:

@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 class Descent:
     """Particles at the vertices, kinematic where a bone holds them, and kinematic bodies with the bones' meshes."""
 
-    takes = ("contact",)
     lost = ()
 
     def __init__(

@@ -32,7 +32,6 @@ def meshed(data, scene: Scene):
 class Descent:
     """The integrator, whose fixed vertices are put where their bones are before each step."""
 
-    takes = ()
     lost = ()
     substeps = 1
 

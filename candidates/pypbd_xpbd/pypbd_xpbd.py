@@ -24,8 +24,6 @@ GRAVITY = 9.81  # along -y in units of length: its library has no call from Pyth
 class Tetrahedra:
     """Particles at the vertices, without mass where a bone holds them."""
 
-    takes = ()
-
     def __init__(self, scene: Scene, substeps: int, poisson: float) -> None:
         simulation = pypbd.Simulation.getCurrent()
         simulation.initDefault()

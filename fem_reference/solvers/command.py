@@ -36,6 +36,7 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
+FOREIGN = "Yours"
 # What a Python of its own executes: a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -103,13 +104,19 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` where a command is given: that of frames, with the settings of the command."""
+    """The contents of ``candidate.toml`` where a command is given: that of frames, with the settings of the command. ``law``: the
+    effect that is the program's own material law, on linear tetrahedra, with the Poisson's ratio of a setting ``poisson`` at most;
+    ``takes``: other effects that it has; ``group``: the kind of its method, as rankings call it.
+    """
 
     settings: dict[str, Value] = Field(default_factory=dict)
     ladder: dict[str, tuple[Value, ...]] = Field(default_factory=dict)
     files: tuple[str, ...] = ()
     moves: str | None = None
     time_limit: str | None = None
+    law: str | None = None
+    takes: tuple[str, ...] = ()
+    group: str = FOREIGN
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:

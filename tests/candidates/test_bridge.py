@@ -30,7 +30,6 @@ THIRD = {
 class Follower:
     """A solver that moves what is held, and nothing else."""
 
-    takes = ("contact",)
     lost = ("3 of 486 tetrahedra",)
 
     def __init__(self, scene: bridge.Scene, factor: float = 1.0) -> None:
@@ -93,7 +92,7 @@ def test_what_is_left_out_is_printed_and_kept(case, exported, tmp_path, monkeypa
     (exported / "scene.json").write_text(json.dumps(said))
     out = tmp_path / "out"
     out.mkdir()
-    monkeypatch.setattr(sys, "argv", ["follower", "--steps", "2", str(exported), str(out)])
+    monkeypatch.setattr(sys, "argv", [str(HERE / "newton_vbd" / "x.py"), "--steps", "2", str(exported), str(out)])
     bridge.main(Follower, "1")
     missed = ["fibre_passive", "springs of left (held exactly)", "neo_hooke in tendon", "3 of 486 tetrahedra"]
     assert capsys.readouterr().out == f"left out: {', '.join(missed)}\n"
