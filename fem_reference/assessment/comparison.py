@@ -103,7 +103,7 @@ class Comparison:
 
     @cached_property
     def unsound(self) -> dict[str, str]:
-        """By candidate whose frames are no answer, the reason; none of fields."""
+        """Reasons why the frames of candidates are no answer, by name; none of fields."""
         if "surface" not in self.reference.carries:
             return {}
         return {run.name: why for run in self.candidates if (why := unsound(run, self.reference))}

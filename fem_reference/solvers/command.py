@@ -36,7 +36,6 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
-FOREIGN = "Yours"
 # What a Python of its own executes: a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -104,9 +103,8 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` where a command is given: that of frames, with the settings of the command. ``law``: the
-    effect that is the program's own material law, on linear tetrahedra, with the Poisson's ratio of a setting ``poisson`` at most;
-    ``takes``: other effects that it has; ``group``: the kind of its method, as rankings call it.
+    """The contents of ``candidate.toml`` beside a program. Its ``law``, an effect, acts on linear tetrahedra, with a Poisson's
+    ratio of at most its setting ``poisson``, beside the effects that it ``takes``.
     """
 
     settings: dict[str, Value] = Field(default_factory=dict)
@@ -116,7 +114,6 @@ class Description(recorded.About):
     time_limit: str | None = None
     law: str | None = None
     takes: tuple[str, ...] = ()
-    group: str = FOREIGN
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
@@ -248,7 +245,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
     missing or damaged.
     """
-    kept, trouble, cost, lacks = 0, None, _cost(problem, settings, ended), ""
+    kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)
         unit, lacks = settings.unit or length_unit(said.unit or "mm"), said.lacks
@@ -259,8 +256,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     except InputError as error:
         trouble = error
     took = f"{ended.seconds:.3g} s, {ended.processor:.3g} s of processor time"
-    last = f" ({ended.said})" if ended.said else ""
-    reached = f"{kept} of {len(problem.frames)} frames are kept"
+    last, reached = f" ({ended.said})" if ended.said else "", f"{kept} of {len(problem.frames)} frames are kept"
     if ended.limit is not None:
         status, why = ended.limit
         return Outcome(status, f"{why}{last}; {reached}", cost)
@@ -278,8 +274,8 @@ def _cost(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     """The measured cost, with start, reading and writing; unknowns are the coordinates of what it moves."""
     free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
     count = free if settings.moves == "surface" else len(problem.mesh.points)
-    used = {"seconds": ended.seconds, "seconds_solve": ended.seconds, "seconds_processor": ended.processor}
-    return used | {"peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
+    used = {"seconds_processor": ended.processor, "peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
+    return {"seconds": ended.seconds, "seconds_solve": ended.seconds} | used
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:

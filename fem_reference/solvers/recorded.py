@@ -1,5 +1,6 @@
 """A sequence of deformed surfaces that another program computed, read from files and checked against the scene."""
 
+import hashlib
 import logging
 import math
 import os
@@ -54,7 +55,8 @@ class RecordedSettings(Record):
 
 class About(Record):
     """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
-    on so many threads, and in words what of the scene was ``left_out``.
+    on so many threads, and in words what of the scene was ``left_out``. For standings: the ``group`` of its method, the ``case`` of
+    these frames, and a ``sha256`` by name of each file, which is checked.
     """
 
     name: FileName | None = None
@@ -63,6 +65,9 @@ class About(Record):
     seconds_per_frame: float | None = Field(default=None, gt=0)
     threads: int | None = Field(default=None, gt=0)
     left_out: tuple[str, ...] = ()
+    group: str | None = None
+    case: Name | None = None
+    sha256: dict[FileName, str] = Field(default_factory=dict)
 
     @property
     def lacks(self) -> str:
@@ -152,6 +157,11 @@ def checked_about(folder: Path, unit: float | None) -> About:
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
         raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {unit:g} mm")
+    for name, wanted in said.sha256.items():
+        file = _about_file(folder).with_name(name)
+        got = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "no file"
+        if got != wanted:
+            raise InputError(f"{_about_file(folder)}: sha256.{name}", f"{got} of the file", wanted)
     return said
 
 

@@ -78,9 +78,9 @@ def _on(
     context = context_of(bench.setup(), reference)
     measures, own = bars.of_deviations if bars else (), needs(scene, scene.reference, context)
     results = [_result(scene, REFERENCE, reference, measures, own)]
-    chosen = _chosen(scene, rows)
-    for i, (kind, candidate, place) in enumerate(chosen):
-        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))
+    those = chosen(scene, rows)
+    for i, (kind, candidate, place) in enumerate(those):
+        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(those))
         run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
         measures = measure(run, reference, context, METRICS)
         found = _result(scene, kind, run, measures, needs(scene, candidate, context))
@@ -93,7 +93,7 @@ def _on(
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
 
 
-def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
+def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
     """The solvers measured on a case, row by row: the kind, the candidate, and the place that names it."""
     found = list[tuple[str, Candidate, str]]()
     for row in rows:
@@ -142,11 +142,23 @@ def _leaves(value: object) -> int:
 def _result(
     case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...], needed: dict[str, int]
 ) -> SolverResult:
-    cost = run.outcome.cost
-    # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
-    given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
-    seconds = seconds_per_frame(run) if given is None else given
     named, machine = (kind, run.name, run.solver, case.name), str(run.origin["machine"])
     return SolverResult(
-        *named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE, needs=needed
+        *named,
+        run.outcome,
+        seconds_of(run),
+        measures,
+        run.numbers,
+        machine,
+        of_reference=kind == REFERENCE,
+        needs=needed,
     )
+
+
+def seconds_of(run: Run) -> float | None:
+    """The time [s] of a frame number where a solver makes one for each, as its ``candidate.toml`` may say; else of a frame that is
+    wanted; None where it is not known.
+    """
+    cost = run.outcome.cost
+    given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
+    return seconds_per_frame(run) if given is None else given
