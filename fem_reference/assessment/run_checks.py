@@ -101,13 +101,14 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, and what is between contact points."""
+    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, what is between points, and is left from rest."""
     for law in body.touching:
-        apart = longest_edge(body.mesh, law) / 4
+        apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
+        at_rest = depth(body.mesh.points) if law.relaxed else 0.0
         for state in solved.states:
-            given = law.smoothing + state.scalars.get("touching_pressure", 0.0) / law.stiffness + _BETWEEN * apart
-            depth = overlap_at(body.mesh, law, state.points)
-            yield RunCheck(f"{law.one} in {law.other}", depth, given, "mm", state.number)
+            pressure = state.scalars.get(law.pressure_name, state.scalars.get("touching_pressure", 0.0))
+            given = law.smoothing + pressure / law.stiffness + _BETWEEN * apart + law.allowance(state.number) * at_rest
+            yield RunCheck(f"{law.one} in {law.other}", depth(state.points), given, "mm", state.number)
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:

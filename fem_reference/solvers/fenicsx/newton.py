@@ -52,6 +52,8 @@ class Newton:
                 return found
         system.unknowns.x.array[:], system.contact = before, contact
         contact.go_back()
+        if system.touching:
+            system.touching.go_back()
         self.thrown += found.iterations
         return self.solve(frame)
 

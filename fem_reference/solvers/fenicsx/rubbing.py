@@ -84,8 +84,11 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Slid
 
 class Rubbing:
     """Friction of the points of one pass by its law. ``facets`` (n,) and ``at`` (n, 2): the places on the other side that hold the
-    points, facet -1 where none does; ``settled`` (u,): the unknowns since when slip is counted.
+    points, facet -1 where none does; ``settled`` (u,): the unknowns since when slip is counted. It ``acts`` once nothing is left
+    of an overlap at rest.
     """
+
+    acts = False
 
     def __init__(self, one: Pass, count: int) -> None:
         self.one, self.law, self.other = one, one.law, one.other
@@ -93,6 +96,7 @@ class Rubbing:
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
         """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) there, and no others."""
+        self.acts = self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
