@@ -40,7 +40,7 @@ def spoiled(name: str) -> tuple[object, ...]:
 # The same muscles attached otherwise, the box of the report beside our own, and a case without a solution take longest: at night.
 AT_NIGHT = (
     *("box_squeeze_report", "gluteus_maximus_anatomical", "gluteus_maximus_tract", "gluteus_medius_anatomical"),
-    *("iliacus_in_situ", *UNSOLVED),
+    *("adductor_brevis", "iliacus_anatomical", "iliacus_in_situ", *UNSOLVED),
 )
 
 
@@ -50,7 +50,7 @@ def often(names):
 
 
 # Cases in which this is the same would show the same: the first of them.
-CONTROLS = list({spoiled(name): name for name in reversed([MAIN_JOB, *SOLVED])}.values())
+CONTROLS = list({spoiled(name): name for name in reversed([MAIN_JOB, *sorted(SOLVED, key=AT_NIGHT.count)])}.values())
 
 
 def quickly(name: str) -> dict[str, object]:
