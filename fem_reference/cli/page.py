@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     names = sorted(_PAGES)
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
-    some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
+    some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: only this case (default: all); may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
