@@ -58,7 +58,7 @@ def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")
     if options.limit:
-        raise InputError("--limit", "with --against", "one of the two: check judges a candidate by its past")
+        raise InputError("--limit", "with --against", "one of the two: check compares with earlier results")
     ((entry, place),) = chosen
     bench, path = checked_bench(scene, options, chosen), options.against
     if path.is_file() and path.suffix == ".json":

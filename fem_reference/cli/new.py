@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         found = new_scene.of_surfaces(folder, options.muscle, options.bone, options.unit)
         unit = {"unit": found.name} | ({"unit_guessed": found.why} if found.why else {})
-        said = f"lengths are in {found.name}, guessed: {found.why}; --unit says it\n" if found.why else ""
+        said = f"lengths are in {found.name}, guessed: {found.why}; --unit states it\n" if found.why else ""
     place = shlex.quote(str(folder if len(folder.parts) > 1 else f"./{folder}"))
     call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # as it was called
     text = f"{said}{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"

@@ -120,7 +120,7 @@ def _estimation(options: argparse.Namespace) -> int:
         found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
     if not found.fits:
         got = "; ".join(f"{case}: {why}" for case, why in found.missing.items())
-        raise InputError(ESTIMATION, f"no case that can be measured ({got})", "one whose files are there")
+        raise InputError(ESTIMATION, f"no case that can be measured ({got})", "one whose files are installed")
     printed = [estimation_page.said(found), *(f"left out: {case}: {why}" for case, why in found.missing.items())]
     page = estimation_page.page(found)
     asked = _asked(scenes, options, [Part(("--solve",), "solved")] if options.solve else [])

@@ -114,7 +114,7 @@ class Rod(Record):
     @classmethod
     def _check_end(cls, end: Vector, info: ValidationInfo) -> Vector:
         if "start" in info.data and not math.dist(info.data["start"], end) > 1e-9:
-            raise ValueError("another point than the start")
+            raise ValueError("a point other than the start")
         return end
 
 

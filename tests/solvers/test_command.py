@@ -199,7 +199,7 @@ def test_a_program_that_only_waits_says_nothing_of_what_was_solved(bar, tmp_path
         ("mine {scene} {out} {n", 'command: got "{n", want a program, with settings such as'),
         ("mine {scene} {out} {n:03d}", "want a program, with settings such as"),
         ("mine {scene} {}", "want a program, with settings such as"),
-        ("mine {scene} 'unclosed", "words as a shell divides them: No closing quotation"),
+        ("mine {scene} 'unclosed", "a command that a shell can parse: No closing quotation"),
         ("mine {out}", "want {scene} in it"),
         ("mine {scene}", "want {out} in it"),
         ("", "a program, with settings"),
