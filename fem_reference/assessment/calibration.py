@@ -91,12 +91,12 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True where the law follows the data, as far as these scatter."""
+        """True where the law fits the data, as far as these scatter."""
         return self.scatter <= FOLLOWED
 
     @property
     def holds(self) -> bool:
-        """True where the fit has converged, the law follows the data, and all estimates are known within their ranges."""
+        """True where the fit has converged, the law fits the data, and all estimates are known within their ranges."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
