@@ -70,10 +70,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Fitted ``estimates`` of a case. ``scatter``: root mean square of what is left, by degree of freedom, in standard deviations
+    """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, by degree of freedom, in standard deviations
     of the data: near 1 where law and data agree. ``singular``: values of the matrix of sensitivities, in standard deviations by
-    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: how many points were asked.
-    ``failures``: those of them without an answer; ``ended``: why the fit could not go on, and so has no intervals, else empty;
+    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: number of points.
+    ``failures``: those that failed; ``ended``: why the fit could not continue, and so has no intervals, else empty;
     ``converged``: True where no step leads nearer to the measurements.
     """
 
