@@ -238,7 +238,7 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """Where points that are inside at ``goals`` (n, 3) end (n, 3), and a mask (n,) of those that went back too far; in voxels.
+    """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of those that went too far; in voxels.
 
     They go straight back along their ``displacements`` (n, 3), in steps of 1, until they are outside; too far means farther than
     their length.
