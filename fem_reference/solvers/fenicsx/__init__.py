@@ -227,7 +227,7 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
         if (settings.ranks or 1) > 1:
             raise InputError("ranks", settings.ranks, "1, on which several muscles are solved")
         if settings.linear_solver == "multigrid":
-            raise InputError("linear_solver", '"multigrid"', "another: its levels do not support touching muscles")
+            raise InputError("linear_solver", '"multigrid"', "another: its levels know no muscles that touch")
         settings = settings.model_copy(update={"ranks": 1})
     chosen = resources.planned(settings, mesh, resources.available())
     _check_ranks(chosen, "ranks")
