@@ -9,8 +9,8 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 class MuscleContact(Interaction):
     """A pressure of the gap between two muscles, on both alike; see ``fem_reference.problems.touching.Touching`` for the law.
 
-    ``stiffness`` [MPa/mm]: under the pressure p the two overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
-    which contact begins, and the largest overlap of two muscles at rest. Only in scenes of several muscles.
+    ``stiffness`` [MPa/mm]: under the pressure p the two overlap by at most p / stiffness. ``smoothing`` [mm]: the distance below
+    which a muscle is felt, and the most by which two may overlap at rest. Only in scenes of several muscles.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}

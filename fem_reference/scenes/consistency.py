@@ -16,7 +16,7 @@ FREE = "free"
 
 
 def check_names(case: MuscleCase) -> None:
-    """Check that names are used once and refer to something."""
+    """Names are used once and refer to something."""
     if any(isinstance(effect, MuscleContact) for effect in case.effects):
         raise InputError(
             join(case.place, "effect"), '"touching" of a single muscle', "several muscles, or no such effect"
