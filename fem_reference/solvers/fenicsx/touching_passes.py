@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints
@@ -109,6 +108,7 @@ class Pass:
         middles, radii = self.other.balls(nodes)
         some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), nodes)
         some, facets = self._beside(nodes, points, some, facets, most)
+        some, facets = self._outside(some, facets, settled or (unknowns, None))
         there = self.other.nearest(nodes, facets, points[some])
         gap = np.einsum("ni,ni->n", points[some] - there.point, there.normal)
         beyond, before = self.other.beyond(there.at), np.full(len(points), -1)
@@ -120,27 +120,26 @@ class Pass:
         here = self._here(self.side.nodes(unknowns), some[felt])
         faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
-        faces &= self._outside(found, settled or (unknowns, None))
         order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
         order = order[faces[order]]
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
-    def _outside(self, met: Met, settled: Settled) -> NDArray[np.bool_]:
-        """True (n,) for those of the points that ``met`` facets that were in front of them, or in contact there, as settled."""
+    def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
+        """Those pairs of points and facets of a part with itself where the point was in front of the facet, or in contact there."""
         if self.own is None:
-            return np.ones(len(met.gap), bool)
+            return some, facets
         unknowns, then = settled
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
-        there = self.other.nearest(nodes, met.facets, points[met.points])
-        gap = np.vecdot(points[met.points] - there.point, there.normal)
+        height, bulge = self._heights(nodes, points, some, facets)
         sizes = np.minimum(self.other.balls(nodes)[1], self.deepest)
-        least = np.minimum(self.law.smoothing, _DEEP * np.minimum(sizes[met.own], sizes[met.facets]))
+        least = np.minimum(self.law.smoothing, _DEEP * np.minimum(sizes[some // self.each], sizes[facets]))
         before = np.full(len(points), -1)
         if then is not None:
             before[then.points] = then.facets
-        held = before[met.points] >= 0
-        held[held] = self.own.beside(before[met.points[held]], met.facets[held])
-        return np.asarray((gap > -least) | held)
+        held = before[some] >= 0
+        held[held] = self.own.beside(before[some[held]], facets[held])
+        kept = (height > -least - bulge[facets]) | held
+        return some[kept], facets[kept]
 
     def _near(self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
         """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm]; of a part with itself only those
@@ -157,13 +156,19 @@ class Pass:
         """Pairs of points and facets, among those given, that may be at gaps up to ``most`` [mm] and less deep than the radius, by
         the plane through the middle of the facet and the heights of its nodes above that.
         """
-        middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         _, radii = self.other.balls(nodes)
-        heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
-        bulge = np.abs(heights).max(axis=1) * _BULGE
-        height = np.einsum("ni,ni->n", points[some] - middle.point[facets], middle.normal[facets])
+        height, bulge = self._heights(nodes, points, some, facets)
         kept = (height < most + bulge[facets]) & (height > -(np.minimum(radii, self.deepest) + bulge)[facets])
         return some[kept], facets[kept]
+
+    def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
+        """The heights (n,) [mm] of points over the planes through the middles of facets, and of each facet (m,) the most that it
+        may bulge from its own.
+        """
+        middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
+        heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
+        bulge = np.abs(heights).max(axis=1) * _BULGE
+        return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] of the points that ``met`` the other side, and its slope in the gap; what is left of an overlap
