@@ -96,7 +96,7 @@ class Rubbing:
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
         """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) there, and no others."""
-        self.acts = self.one.share == 0
+        self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 

@@ -61,7 +61,7 @@ class TouchingForces:
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if one.law.relaxed:
+            if one.law.relaxed or one.own:
                 one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
         self.seen = np.full_like(self.seen, np.nan)
         self.settle()
