@@ -96,7 +96,7 @@ class Rubbing:
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
         """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) there, and no others."""
-        self.acts = self.one.share == 0
+        self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
@@ -171,7 +171,8 @@ class Rubbing:
         none, count = np.zeros((len(own), 6, own.shape[1])), len(own)
         by = np.concatenate([none, others], axis=2)
         by[:, 0] = np.concatenate([own, -others[:, 0]], axis=1)
-        vectors = (by[:, :3, None, :, None] * np.eye(3)[:, None]).reshape(count, 9, -1)
-        along = (by[:, 3:, :, None] * met.there.normal[:, None, None]).reshape(count, 3, -1)
-        dofs = np.concatenate([self.one.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, -1)
+        width = 3 * by.shape[2]
+        vectors = (by[:, :3, None, :, None] * np.eye(3)[:, None]).reshape(count, 9, width)
+        along = (by[:, 3:, :, None] * met.there.normal[:, None, None]).reshape(count, 3, width)
+        dofs = np.concatenate([self.one.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, width)
         return dofs, np.concatenate([vectors, along], axis=1)

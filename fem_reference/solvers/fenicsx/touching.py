@@ -36,13 +36,17 @@ class TouchingForces:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
         self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
         for law in body.touching:
-            low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
-            self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
+            names = dict.fromkeys((law.one, law.other))
+            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
+            low, high = parts[law.one], parts[law.other]
+            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
+            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
         self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
         self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
+        self.settled: State = np.array(self.unknowns.x.array), [], []
         self.move_to(body.frames[0])
         self.settle()
         depths = [
@@ -57,7 +61,7 @@ class TouchingForces:
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if one.law.relaxed:
+            if one.law.relaxed or one.own:
                 one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
         self.seen = np.full_like(self.seen, np.nan)
         self.settle()
@@ -75,7 +79,7 @@ class TouchingForces:
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
         """The skin around the other part, by pass, that its points may not touch; None where there is none."""
-        pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
+        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
         around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
         return [
             Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
@@ -87,10 +91,11 @@ class TouchingForces:
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
-                lasts = [*(met for met, _ in self.now), *(None for _ in self.passes if not self.now)]
-                mets = [
-                    one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
-                ]
+                none = [None] * len(self.passes)
+                lasts, thens = ([met for met, _ in state] or none for state in (self.now, self.settled[1]))
+                columns = zip(self.passes, lasts, thens, strict=True)
+                before = self.settled[0]
+                mets = [one.met(self.seen, one.law.smoothing, last, (before, then)) for one, last, then in columns]
                 self.now = [(met, one.pressed(met)) for one, met in zip(self.passes, mets, strict=True)]
                 pairs = zip(self.rubbing, mets, strict=True)
                 self.rubbed = [one.rubbed(met, self.seen) if one and one.acts else None for one, met in pairs]
@@ -127,6 +132,8 @@ class TouchingForces:
         self.look()
         found = dict[str, tuple[Floats, Floats]]()
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
+            if one.own is not None:  # of a part on itself: none in all
+                continue
             forces = contact.forces[:, None] * met.there.normal  # on the points
             for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
@@ -193,7 +200,7 @@ class TouchingForces:
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
-            lost, how = one.through(before, self.seen, met), "went through the other side"
+            lost, how = one.through(before, last, self.seen, met), "went through the other side"
             if rim and not len(lost):
                 lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
             if rubbed and not len(lost):
