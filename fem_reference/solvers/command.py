@@ -166,7 +166,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     try:
         words = shlex.split(command)
     except ValueError as error:
-        raise InputError(where, f'"{command}"', f"words as a shell divides them: {error}") from error
+        raise InputError(where, f'"{command}"', f"a command that a shell can parse: {error}") from error
     strange = [word for word in words if set("{}") & set(_PLACEHOLDER.sub("", word))]
     if not words or strange:
         raise InputError(where, f'"{strange[0] if words else ""}"', "a program, with settings such as {iterations}")
@@ -177,7 +177,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     taken = {*CommandSettings.model_fields, *MACHINE_ONLY, "solver", "name", "folder"}  # the last is a file of a scene
     for name in names:
         if name in taken or hasattr(CommandSettings, name):
-            raise InputError(where, f'"{{{name}}}"', "another name of a setting: this one has a meaning here")
+            raise InputError(where, f'"{{{name}}}"', "another name for the setting: this one is reserved")
     return tuple(name for name in names if name not in FOLDERS)
 
 
