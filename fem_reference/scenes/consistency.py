@@ -1,4 +1,4 @@
-"""Checks of the case of a muscle beyond those of its keys: names are used once and refer to something, and it rests at first."""
+"""Checks of a muscle's case beyond those of its keys: names are unique and refer to something, and it rests at first."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def check_names(case: MuscleCase) -> None:
 
 
 def _check_forces(case: MuscleCase) -> None:
-    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
+    """Check that names of forces are distinct and that something keeps the muscle from drifting."""
     bones = [bone.name for bone in case.bone]
     contact = among(case.effects) is not None
     for i, attachment in enumerate(case.attachment):

@@ -120,7 +120,7 @@ def stored(reference: Run) -> ErrorBars | None:
         return None
     bars = error_bars.load(reference.folder, _of(reference))
     if bars is None and (reference.folder / error_bars.FILE).exists():
-        log.info("%s: made by other metrics; --error-bar makes it anew", reference.folder / error_bars.FILE)
+        log.info("%s: made by other metrics; --error-bar computes it again", reference.folder / error_bars.FILE)
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
@@ -162,7 +162,7 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     coarse = runs[larger]
     if not _tets(coarse) < _tets(reference):
         got = f"meshes of {_tets(reference):.0f} and {_tets(coarse):.0f} tetrahedra"
-        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that coarser meshes differ from")
+        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that a coarser mesh differs from")
     return Pair(
         reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench), springs
     )
