@@ -32,6 +32,11 @@ class Touching:
         """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
         return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
 
+    @property
+    def pressure_name(self) -> str:
+        """The name of the scalar of a frame that is its greatest pressure [MPa]."""
+        return pressure_name(self.one, self.other)
+
     def allowance(self, frame: float) -> float:
         """The share of the overlap at rest that is subtracted at ``frame``."""
         return 0.0 if self.relaxed is None else remaining(self.relaxed, frame)
@@ -39,6 +44,11 @@ class Touching:
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
+
+
+def pressure_name(one: str, other: str) -> str:
+    """The name of the scalar of a frame that is the greatest pressure [MPa] between two parts."""
+    return f"touching_pressure of {one} and {other}"
 
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints]) -> None:

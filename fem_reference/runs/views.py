@@ -5,12 +5,23 @@ from dataclasses import replace
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem, Span
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Run
 
 # Scalars of all muscles together, which say nothing of one.
-_OF_ALL = ("volume_ratio", "energy", "force_", "moment_", "net_", "attachment_error_", "stress_", "load_")
+_OF_ALL = (
+    "volume_ratio",
+    "energy",
+    "force_",
+    "moment_",
+    "net_",
+    "attachment_error_",
+    "stress_",
+    "load_",
+    "touching_pressure of ",
+)
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
@@ -32,10 +43,15 @@ def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
     )
 
 
+def force_between(name: str, other: str) -> str:
+    """The name, among forces, of that of a muscle by ``name`` on an ``other``."""
+    return f"{called(name, 'free')} on {called(other, 'free')}"
+
+
 def _own(key: str, name: str, others: tuple[str, ...]) -> str:
     """The name that a force, by its ``key``, has for the muscle of a ``name``; empty where it is not on it."""
     for other in others:
-        if key == f"{other} free on {name} free":
+        if key == force_between(other, name):
             return other
     return key.removeprefix(f"{name} ") if key.startswith(f"{name} ") and not key.endswith(" free") else ""
 

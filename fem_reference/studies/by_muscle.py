@@ -50,6 +50,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
     Frames are read from folders with the names of the muscles; a candidate may lack some.
     """
     parts, found = bench.parts, dict[str, Comparison]()
+    chosen = [(bench.found(*one), one[1]) for one in chosen]
     own = {name: [_own(one, name) for one in chosen] for name in parts}
     for i, (entry, place) in enumerate(chosen):
         if all(given[i] is None for given in own.values()):

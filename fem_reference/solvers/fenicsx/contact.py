@@ -184,7 +184,8 @@ class ContactForces:
         """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point; the rest area in contact,
         ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries, ``contact_points_near``; and
         the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm], where it is removed or, in situ, stays. With
-        friction its dissipated work since the start, ``friction_work`` [N mm].
+        friction its dissipated work since the start, ``friction_work`` [N mm]. Where the law has parts, also the greatest pressure
+        on each, ``PART.contact_pressure``.
         """
         comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
         depth = pressure = 0.0
@@ -193,6 +194,9 @@ class ContactForces:
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
         greatest = {"contact_depth": depth, "contact_pressure": pressure}
+        for part, first, last in self.law.parts:
+            own = [one.pressure[(one.pressed >= first) & (one.pressed < last)].max(initial=0.0) for one in self.now]
+            greatest[f"{part}.contact_pressure"] = float(max(own))
         kept = self.law.in_situ is not None
         greatest |= {"overlap_at_rest": self.overlap} if self.law.relaxed or kept else {}
         sums = {

@@ -132,10 +132,10 @@ class TouchingForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
-        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
-        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
-        the start, ``touching_friction_work`` [N mm].
+        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, and the pressure of each law; the rest
+        area under pressure, ``touching_area`` [mm2], the mean of both sides; the number of points under pressure,
+        ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and
+        with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
@@ -143,9 +143,13 @@ class TouchingForces:
         gaps = np.concatenate([met.gap for met, _ in self.now])
         more = {"touching_overlap_at_rest": self.overlap} if removed else {}
         more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
+        pressures = [float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs]
+        for one, pressure in zip(self.passes, pressures, strict=True):
+            key = one.law.pressure_name
+            more[key] = max(pressure, more.get(key, 0.0))
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
-            "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
+            "touching_pressure": max(pressures),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
         } | more
