@@ -11,6 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.version import __version__
 from fem_reference.io import files
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase
 
 
 def check(folder: Path) -> None:
@@ -39,7 +40,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
                 parent.rmdir()
 
 
-def write_text(path: Path, case: MuscleCase, file: str | None = None, **values: str) -> None:
+def write_text(path: Path, case: MuscleCase | MusclesCase, file: str | None = None, **values: str) -> None:
     """Write the text of a ``file`` of this folder, by default that of the same name, with facts of the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
     known = {"title": case.title, "name": case.name, "version": __version__, "first": str(case.frames.first)}

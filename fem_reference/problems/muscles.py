@@ -1,5 +1,6 @@
 """Several muscles of one scene: each as a set-up and a problem of its own, and all as one body with contact between them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -141,7 +142,7 @@ class MusclesProblem:
             assert law is not None  # without contact no pair may touch
             at = called(one, "free"), called(other, "free")
             removed = relaxed if self._near_at_rest(one, other) else None
-            touching.append(Touching(*at, law.stiffness, law.smoothing, relaxed=removed))
+            touching.append(Touching(*at, law.stiffness, law.smoothing, relaxed=removed, around=True))
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
@@ -215,7 +216,7 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
     if any(one.outer for one in case.effects):
         return length_of(rest)
     known, contact = estimates(case, rest), contacts.among(case.effects)
-    bulge = thickness_of(rest) / 2 * (min(known.stretch[0], 1.0) ** -0.5 - 1)
+    bulge = thickness_of(rest) / 2 * (1 / math.sqrt(min(known.stretch[0], 1.0)) - 1)
     bones = known.near if contact and contact.bones is None else (contact.bones or () if contact else ())
     return bulge + max((-known.near[name].gap for name in bones if known.near[name].gap < 0), default=0.0)
 

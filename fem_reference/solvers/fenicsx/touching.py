@@ -29,11 +29,8 @@ class TouchingForces:
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
-        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
-        for law in body.touching:
-            low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
-            self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
-        self.rims = self._rims(body, displacement)
+        self.unknowns, self.spent = displacement.unknowns, spent
+        self.passes, self.rims = self._passes(body, form, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
@@ -66,14 +63,23 @@ class TouchingForces:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
-    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
-        pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
-        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
-        return [
-            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
-            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
-        ]
+    @staticmethod
+    def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
+        """The passes of both sides of each law; and by pass the skin around the other part that its points may not touch, None
+        where there is none, or where it is felt.
+        """
+        sides = [side for law in body.touching for side in ((law, law.one, law.other), (law, law.other, law.one))]
+        skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
+        parts = {name: form.regions[name] for _, name, _ in sides}
+        own = {name: facets_of(displacement, body.mesh, part) for name, part in parts.items()}
+        passes, rims = list[Pass](), list[Pass | None]()
+        for (law, one, other), around in zip(sides, skins, strict=True):
+            felt = np.concatenate([parts[other], around]) if law.around else None
+            whole = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
+            passes.append(Pass(law, own[one], whole, (f"{other} on {one}", f"{one} on {other}")))
+            ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
+            rims.append(ends and Pass(law, own[one], ends, (one, other)))
+        return passes, rims
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
