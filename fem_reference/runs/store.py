@@ -10,7 +10,7 @@
                       /restart/        of an unfinished run: the state from which its solver continues (``writer``)
 """
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -93,6 +93,7 @@ class Run:
     surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
     name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a body they are the
     whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested. ``residuals`` by frame.
+    ``others``: of one of several muscles, the same frames of the others by name.
     """
 
     name: str
@@ -113,6 +114,7 @@ class Run:
     body: Body | None = None
     settings: Record | None = None
     residuals: tuple[tuple[float, ...], ...] = ()
+    others: Mapping[str, "Run"] = field(default_factory=dict)
 
     @property
     def last(self) -> Frame:

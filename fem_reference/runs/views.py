@@ -1,5 +1,6 @@
 """Frames and runs of several muscles as those of one of them. Scalars of one muscle have its name before a dot."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -60,6 +61,14 @@ def _state_of(state: NodalState, cells: slice) -> NodalState:
     """The state of some of the cells."""
     before = state.before[cells] if len(state.before) else state.before
     return replace(state, displacement=state.displacement[cells], pressure=state.pressure[cells], before=before)
+
+
+def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
+    """The ``runs`` of muscles by name, with the same frames, each with the others."""
+    return {
+        name: replace(run, others={other: one for other, one in runs.items() if other != name})
+        for name, run in runs.items()
+    }
 
 
 def run_of(run: Run, problem: MusclesProblem, name: str) -> Run:
