@@ -231,7 +231,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
     if not place.exists():
         return None
     try:
-        table = texts.read_json(place, "the error bar of a stored run (--error-bar makes it anew)")
+        table = texts.read_json(place, "the error bar of a stored run (--error-bar computes it again)")
         if table["format"] != FORMAT or table["of"] != of:
             return None
         bars = TypeAdapter(ErrorBars).validate_python(table | {"sizes": table["sizes_mm"]})
@@ -240,7 +240,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
                 raise ValueError(f"the bar of {bar.metric}.{bar.statistic}")
         return bars
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
+        raise InputError(place, repr(error), "the error bar of a stored run (--error-bar computes it again)") from error
 
 
 @dataclass(frozen=True, eq=False)

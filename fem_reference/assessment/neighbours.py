@@ -24,10 +24,11 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     """
     if not problem.apart:
         return ()
-    checks = list[RunCheck]()
+    checks, none = list[RunCheck](), np.zeros(len(run.numbers))
     for pair in combinations(problem.spans, 2):
-        known = pressure_name(*(called(span.name, "free") for span in pair))
-        pressures = np.nan_to_num(run.scalars.get(known, np.zeros(len(run.numbers))))
+        own = pressure_name(*(called(span.name, "free") for span in pair))
+        touch = (pair[0].name, pair[1].name) in problem.pairs
+        pressures = np.nan_to_num(run.scalars.get(own, run.scalars.get("touching_pressure", none)) if touch else none)
         skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
         edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
         law = problem.law

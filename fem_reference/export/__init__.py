@@ -10,8 +10,9 @@ from fem_reference.export.folders import check, new_folder, write_text
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.solvers.common import open_formats
 
 log = logging.getLogger(__name__)
@@ -29,9 +30,7 @@ _FEBIO_OF_ALL = """
 _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the muscle at rest"
 
 
-def export(
-    case: MuscleCase | MusclesCase, build: Callable[[], MuscleProblem | MusclesProblem], folder: Path, form: Format
-) -> list[str]:
+def export(case: Case, build: Callable[[], MuscleProblem | MusclesProblem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. Of several muscles each has a folder
@@ -40,19 +39,24 @@ def export(
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
-    for one in (case.parts if isinstance(case, MusclesCase) else (case,)) if form == "febio" else ():
+    for one in _parts(case) if form == "febio" else ():
         febio.check(one)
     with new_folder(folder) as part:  # whether it can be written shows before a problem is built
         problem = build()
-        if isinstance(case, MuscleCase) and isinstance(problem, MuscleProblem):
-            _write(case, problem, part, _FEBIO_FILES if form == "febio" else "")
-        if isinstance(case, MusclesCase) and isinstance(problem, MusclesProblem):
+        if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
+        else:
+            _write(_parts(case)[0], problem, part, _FEBIO_FILES if form == "febio" else "")
         if form == "febio":
             _write_febio(case, problem, part)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
     log.info("%s: %d files in %s", case.name, len(written), folder)
     return written
+
+
+def _parts(case: Case) -> tuple[MuscleCase, ...]:
+    """The muscles of a case."""
+    return case.parts or (casefile.muscle(case),)
 
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) -> None:
@@ -61,13 +65,13 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
     write_text(folder / "README.md", case, more=more)
 
 
-def _write_several(case: MusclesCase, problem: MusclesProblem, folder: Path, form: Format) -> None:
+def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
     """A folder for each muscle, and what is of all."""
-    for muscle, part, one in zip(case.muscle, case.parts, problem.problems.values(), strict=True):
-        (folder / muscle.name).mkdir()
-        _write(part.model_copy(update={"name": case.name}), one, folder / muscle.name, "")
+    for part, (name, one) in zip(case.parts, problem.problems.items(), strict=True):
+        (folder / name).mkdir()
+        _write(part.model_copy(update={"name": case.name}), one, folder / name, "")
         if form == "febio":
-            febio.write_nodes(one, folder / muscle.name)
+            febio.write_nodes(one, folder / name)
     near = ", ".join(" and ".join(pair) for pair in problem.pairs) or "no two"
     names = "\n".join(f"- `{name}`" for name in problem.problems)
     write_text(
@@ -75,7 +79,7 @@ def _write_several(case: MusclesCase, problem: MusclesProblem, folder: Path, for
     )
 
 
-def _write_febio(case: MuscleCase | MusclesCase, problem: MuscleProblem | MusclesProblem, folder: Path) -> None:
+def _write_febio(case: Case, problem: MuscleProblem | MusclesProblem, folder: Path) -> None:
     """FEBio's own file, and its differences."""
     if isinstance(problem, MusclesProblem):
         differences = febio_several.notes(problem)

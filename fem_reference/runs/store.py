@@ -91,9 +91,8 @@ class Run:
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
     [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines only moves no
     surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
-    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a body they are the
-    whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested. ``residuals`` by frame.
-    ``others``: of one of several muscles, the same frames of the others by name.
+    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames in memory; for a body they are the whole run.
+    ``body``, ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: other muscles' runs by name.
     """
 
     name: str
@@ -203,7 +202,7 @@ def load(folder: Path) -> Run:
     place = folder / "run.json"
     state = texts.read_json(place, "the run.json of a stored run")
     if isinstance(state, dict) and state.get("status") == "running":
-        raise InputError(f"{place}: status", '"running"', "a run that came to its end")
+        raise InputError(f"{place}: status", '"running"', "a finished run")
     stored = parse(Contents, state, f"{place}: run")
     outcome = Outcome(stored.status, stored.message, stored.cost)
     scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}

@@ -237,7 +237,7 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings with open ones filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
-    if problem.body.touching:
+    if isinstance(problem, MusclesProblem) or problem.body.touching:  # parts of contact with bones are of one rank, too
         _check_touching(settings, "reference")
         settings = settings.model_copy(update={"ranks": 1})
     chosen = resources.planned(settings, mesh, resources.available())
@@ -259,7 +259,8 @@ def _has_steps(problem: AnyMuscle) -> bool:
 def _check_touching(settings: Settings, place: str) -> None:
     """Raise InputError below ``place`` where the settings do not suit muscles that touch."""
     if (settings.ranks or 1) > 1:
-        raise InputError(join(place, "ranks"), settings.ranks, "1, on which muscles that touch are solved")
+        want = "1, on which several muscles, or one that touches itself, are solved"
+        raise InputError(join(place, "ranks"), settings.ranks, want)
     if settings.linear_solver == "multigrid":
         raise InputError(join(place, "linear_solver"), '"multigrid"', "another: its levels know no muscles that touch")
 

@@ -4,6 +4,9 @@ Points of quadrature on either side meet the nearest place on the facets of the 
 both sides are alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from scipy.sparse import csr_array
 
@@ -20,6 +23,8 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
+# The unknowns (n,) of a search, what each pass met, and its friction.
+State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None]]
 
 
 class TouchingForces:
@@ -35,6 +40,8 @@ class TouchingForces:
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
         self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
+        self.settled: State = np.array(self.unknowns.x.array), [], []
+        self.move_to(body.frames[0])
         self.settle()
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
@@ -48,16 +55,17 @@ class TouchingForces:
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if one.law.relaxed:
+            if one.law.relaxed or one.own:
                 one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
-        self.move_to(body.frames[0])
+        self.seen = np.full_like(self.seen, np.nan)
+        self.settle()
 
     def move_to(self, frame: float) -> None:
         """Subtract what is left at ``frame`` of overlaps at rest."""
         for one in self.passes:
             if (share := one.law.allowance(frame)) != one.share:
                 one.share = share
-                self.seen[:] = np.nan
+                self.seen = np.full_like(self.seen, np.nan)
 
     def acting(self) -> list[float]:
         """The shares of overlaps at rest that are subtracted."""
@@ -65,10 +73,11 @@ class TouchingForces:
 
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
-        """The passes of both sides of each law; and by pass the skin around the other part that its points may not touch, None
-        where there is none, or where it is felt.
+        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
+        its points may not touch, None where there is none, or where it is felt.
         """
-        sides = [side for law in body.touching for side in ((law, law.one, law.other), (law, law.other, law.one))]
+        both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
+        sides = [(law, *pair) for law, pairs in both for pair in pairs]
         skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
         parts = {name: form.regions[name] for _, name, _ in sides}
         own = {name: facets_of(displacement, body.mesh, part) for name, part in parts.items()}
@@ -76,7 +85,7 @@ class TouchingForces:
         for (law, one, other), around in zip(sides, skins, strict=True):
             felt = np.concatenate([parts[other], around]) if law.around else None
             whole = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
-            passes.append(Pass(law, own[one], whole, (f"{other} on {one}", f"{one} on {other}")))
+            passes.append(Pass(law, own[one], whole, law.forces if one == law.one else law.forces[::-1]))
             ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
             rims.append(ends and Pass(law, own[one], ends, (one, other)))
         return passes, rims
@@ -86,13 +95,14 @@ class TouchingForces:
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
-                lasts = [*(met for met, _ in self.now), *(None for _ in self.passes if not self.now)]
-                mets = [
-                    one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
-                ]
+                none = [None] * len(self.passes)
+                lasts, thens = ([met for met, _ in state] or none for state in (self.now, self.settled[1]))
+                columns = zip(self.passes, lasts, thens, strict=True)
+                before = self.settled[0]
+                mets = [one.met(self.seen, one.law.smoothing, last, (before, then)) for one, last, then in columns]
                 self.now = [(met, one.pressed(met)) for one, met in zip(self.passes, mets, strict=True)]
                 pairs = zip(self.rubbing, mets, strict=True)
-                self.rubbed = [one.rubbed(met, self.seen) if one else None for one, met in pairs]
+                self.rubbed = [one.rubbed(met, self.seen) if one and one.acts else None for one, met in pairs]
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
@@ -126,6 +136,8 @@ class TouchingForces:
         self.look()
         found = dict[str, tuple[Floats, Floats]]()
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
+            if one.own is not None:  # of a part on itself: none in all
+                continue
             forces = contact.forces[:, None] * met.there.normal  # on the points
             for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
@@ -138,10 +150,10 @@ class TouchingForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, and the pressure of each law; the rest
-        area under pressure, ``touching_area`` [mm2], the mean of both sides; the number of points under pressure,
-        ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and
-        with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
+        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, of several laws each its own pressure
+        too (``Touching.pressure_name``); the rest area under pressure, ``touching_area`` [mm2], the mean of both sides; the number
+        of points under pressure, ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm],
+        where it is removed; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
@@ -149,13 +161,14 @@ class TouchingForces:
         gaps = np.concatenate([met.gap for met, _ in self.now])
         more = {"touching_overlap_at_rest": self.overlap} if removed else {}
         more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
-        pressures = [float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs]
-        for one, pressure in zip(self.passes, pressures, strict=True):
-            key = one.law.pressure_name
-            more[key] = max(pressure, more.get(key, 0.0))
+        most = dict[str, float]()
+        for one, (met, _) in pairs:
+            name = one.law.pressure_name
+            most[name] = max(most.get(name, 0.0), float(one.pressure(met)[0].max(initial=0.0)))
+        more |= most if len(most) > 1 else {}
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
-            "touching_pressure": max(pressures),
+            "touching_pressure": max(most.values()),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
         } | more
@@ -163,20 +176,34 @@ class TouchingForces:
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
         self.look()
-        self.settled = [met for met, _ in self.now]
-        for one, met, rubbed in zip(self.rubbing, self.settled, self.rubbed, strict=True):
-            if one and rubbed:
-                one.settle(met, rubbed.held, self.seen)
-                self.dissipated += float(rubbed.lost.sum())
+        for one, (met, _), rubbed in zip(self.rubbing, self.now, self.rubbed, strict=True):
+            if one:
+                one.settle(met, rubbed.held if rubbed else met.there.at, self.seen)
+                self.dissipated += float(rubbed.lost.sum()) if rubbed else 0.0
         if any(self.rubbing):
-            self.seen = np.full(len(self.seen), np.nan)  # what holds the points is another
+            self.seen = np.full_like(self.seen, np.nan)  # what holds the points is another
+            self.look()
+        self.settled = self.state
+
+    @property
+    def state(self) -> State:
+        """The contact at the unknowns of the last search, which determines the facets that points stay on in the next."""
+        return self.seen, self.now, self.rubbed
+
+    def restoring(self) -> Callable[[], None]:
+        """A function that restores the present state, as the unknowns have been."""
+        return partial(self.go_back, self.state)
+
+    def go_back(self, state: State | None = None) -> None:
+        """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        self.seen, self.now, self.rubbed = state or self.settled
 
     def trouble(self, before: Floats, /) -> Trouble | None:
         """Diverged where a point went through the other part since the unknowns ``before`` (n,), past its rim or too far."""
         self.look()
-        columns = self.passes, self.rims, self.settled, self.now, self.rubbed
-        for one, rim, last, (met, _), rubbed in zip(*columns, strict=True):
-            lost, how = one.through(before, self.seen, met), "went through the other side"
+        columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
+        for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
+            lost, how = one.through(before, last, self.seen, met), "went through the other side"
             if rim and not len(lost):
                 lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
             if rubbed and not len(lost):
