@@ -180,10 +180,9 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, by part of the law ``PART.contact_pressure``;
-        the rest area in contact, ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries,
-        ``contact_points_near``; ``overlap_at_rest`` [mm], of the deepest point at rest, where it is removed or, in situ, stays;
-        with friction its dissipated work since the start, ``friction_work`` [N mm].
+        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, ``PART.contact_pressure`` in parts of the law;
+        the rest area in contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, queries of distances;
+        ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
