@@ -180,7 +180,7 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, ``PART.contact_pressure`` in parts of the law;
+        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, ``PART.contact_pressure`` in parts;
         the rest area in contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, queries of distances;
         ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
         """
