@@ -83,11 +83,11 @@ class TouchingForces:
         own = {name: facets_of(displacement, body.mesh, part) for name, part in parts.items()}
         passes, rims = list[Pass](), list[Pass | None]()
         for (law, one, other), around in zip(sides, skins, strict=True):
-            felt = np.concatenate([parts[other], around]) if law.around else None
+            felt = np.concatenate([parts[other], around]) if law.around and len(around) else None
             whole = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
             passes.append(Pass(law, own[one], whole, law.forces if one == law.one else law.forces[::-1]))
             ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
-            rims.append(ends and Pass(law, own[one], ends, (one, other)))
+            rims.append(None if ends is None else Pass(law, own[one], ends, (one, other)))
         return passes, rims
 
     def look(self) -> None:
