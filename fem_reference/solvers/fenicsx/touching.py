@@ -87,7 +87,7 @@ class TouchingForces:
             whole = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
             passes.append(Pass(law, own[one], whole, law.forces if one == law.one else law.forces[::-1]))
             ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
-            rims.append(ends and Pass(law, own[one], ends, (one, other)))
+            rims.append(None if ends is None else Pass(law, own[one], ends, (one, other)))
         return passes, rims
 
     def look(self) -> None:
