@@ -47,7 +47,7 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
         else:
-            _write(_parts(case)[0], problem.muscle, part, _FEBIO_FILES if form == "febio" else "")
+            _write(_parts(case)[0], _muscle(problem), part, _FEBIO_FILES if form == "febio" else "")
         if form == "febio":
             _write_febio(case, problem, part)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
@@ -58,6 +58,13 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
 def _parts(case: Case) -> tuple[MuscleCase, ...]:
     """The muscles of a case."""
     return tuple(casefile.muscle(one) for one in case.parts or (case,))
+
+
+def _muscle(problem: CaseProblem) -> MuscleProblem:
+    """The problem of a muscle; InputError where there is none."""
+    if problem.muscle is None:
+        raise InputError("export", "a scalar field", "a muscle")
+    return problem.muscle
 
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) -> None:
@@ -86,8 +93,8 @@ def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
         differences = febio_several.notes(problem)
         febio.write_model(febio_several.model(problem), folder)
     else:
-        differences = febio_contact.notes(problem.muscle)
-        febio.write(problem.muscle, folder)
+        differences = febio_contact.notes(_muscle(problem))
+        febio.write(_muscle(problem), folder)
     for difference in differences:
         log.warning("another model in FEBio: %s", difference)
     write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))
