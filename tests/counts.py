@@ -199,6 +199,7 @@ ADDED = {
     "several muscles in one scene": 1080,
     "friction": 590,
     "own solvers as commands, load of the machine, answers first": 880,
+    "laws of other people's solvers, split errors, standings": 700,
 }
 
 

@@ -17,6 +17,7 @@ from fem_reference.report import (
     estimation_page,
     field_page,
     ranking_page,
+    standings_page,
     stress_page,
     study_page,
     uncertainty_page,
@@ -25,7 +26,7 @@ from fem_reference.report import (
 from tests.assessment import test_credibility, test_estimation, test_uncertainty, test_versions
 from tests.report import entries as made_entries
 from tests.report import examples as scalar_examples
-from tests.report import test_study_page
+from tests.report import test_standings_page, test_study_page
 from tests.studies import test_omissions as test_effects_verb
 from tests.studies import test_table_5_1
 from tests.studies import test_true_errors as test_claims
@@ -44,6 +45,7 @@ KINDS = (
     "estimation",
     "credibility",
     "uncertainty",
+    "standings",
     "versions",
     "index",
 )
@@ -75,6 +77,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
         "estimation": ("page", estimation_page.page(test_estimation.found())),
         "credibility": ("page", credibility_page.page(test_credibility.found())),
         "uncertainty": ("uncertainty", uncertainty_page.page(test_uncertainty.study(test_uncertainty.band()))),
+        "standings": ("standings", standings_page.page(test_standings_page.found())),
     }
     paths = [
         report.write(report.of_comparison(one), folder / name, report.NAME, f"fem-reference compare {name}")

@@ -33,7 +33,11 @@
 
   const cut = () => [...document.querySelectorAll(".wide")].filter(it => it.scrollWidth > it.clientWidth + 1)
     .map(it => [it.innerText.slice(0, 60), it.scrollWidth]);
+  const signed = it => getComputedStyle(it, "::before").content.includes("scroll for more");
+  const unsaid = () => [...document.querySelectorAll("body *")] // what is cut without a sign
+    .filter(it => ["auto", "scroll"].includes(getComputedStyle(it).overflowX) && it.scrollWidth > it.clientWidth + 1 && !signed(it))
+    .map(it => [it.tagName, String(it.className), it.innerText.slice(0, 40)]);
   const open = () => document.querySelectorAll("details").forEach(it => { it.open = true; });
   const controls = () => [...document.querySelectorAll(".controls, .viewer")].filter(it => it.getClientRects().length).length;
-  window.checks = { pale, wide, cut, open, controls };
+  window.checks = { pale, wide, cut, unsaid, open, controls };
 })();

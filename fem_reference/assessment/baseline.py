@@ -161,7 +161,7 @@ def _check_shape(place: str, baseline: Baseline) -> None:
     for name, stored in baseline.measures.items():
         key = f"{place}: measures.{name}"
         if known.get(name) != stored.unit:
-            want = "a statistic that there is" + (f", in {known[name]}" if name in known else "")
+            want = "an existing statistic" + (f", in {known[name]}" if name in known else "")
             raise InputError(key, f'one in "{stored.unit}"', want)
         if len(stored.values) != frames:
             raise InputError(f"{key}.values", f"{len(stored.values)} values", f"{frames}, one a frame")

@@ -70,10 +70,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Fitted ``estimates`` of a case. ``scatter``: root mean square of what is left, by degree of freedom, in standard deviations
+    """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, by degree of freedom, in standard deviations
     of the data: near 1 where law and data agree. ``singular``: values of the matrix of sensitivities, in standard deviations by
-    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: how many points were asked.
-    ``failures``: those of them without an answer; ``ended``: why the fit could not go on, and so has no intervals, else empty;
+    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: number of points.
+    ``failures``: those that failed; ``ended``: why the fit could not continue, and so has no intervals, else empty;
     ``converged``: True where no step leads nearer to the measurements.
     """
 
@@ -91,12 +91,12 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True where the law follows the data, as far as these scatter."""
+        """True where the law fits the data, as far as these scatter."""
         return self.scatter <= FOLLOWED
 
     @property
     def holds(self) -> bool:
-        """True where the fit has converged, the law follows the data, and all estimates are known within their ranges."""
+        """True where the fit has converged, the law fits the data, and all estimates are known within their ranges."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 

@@ -1,7 +1,7 @@
 """A reference and its candidates, measured and judged, as input of reports."""
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.assessment.judge import Verdict, Word, doubted, doubts, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
+from fem_reference.assessment.soundness import unsound
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Ints
@@ -96,8 +97,16 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """The order of the candidates, as far as the error bars separate them; empty without bars."""
-        return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
+        """The order of the sound candidates, as far as the error bars separate them; empty without bars."""
+        sound = {name: found for name, found in self.deviations.items() if name not in self.unsound}
+        return rankings(sound, self.error_bars.of_deviations) if self.error_bars else ()
+
+    @cached_property
+    def unsound(self) -> dict[str, str]:
+        """Reasons why the frames of candidates are no answer, by name; none of fields."""
+        if "surface" not in self.reference.carries:
+            return {}
+        return {run.name: why for run in self.candidates if (why := unsound(run, self.reference))}
 
     @property
     def doubts(self) -> list[str]:

@@ -124,7 +124,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
     """Raise InputError below ``place`` where a study lacks a feature, or it is none that a case can have."""
     for name in FEATURES:
         if name not in study.features:
-            raise InputError(f"{place}: features.{name}", "nothing", "this number: the verb study makes it anew")
+            raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")
         value = study.features[name]
         if name in _ABOVE_ZERO and not value > 0:
             raise InputError(f"{place}: features.{name}", f"{value:g}", "more than 0")

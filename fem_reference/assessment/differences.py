@@ -11,6 +11,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at one place; the average over places goes with each.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
+_LEAST = 0.5  # share of the distance of two runs: averages of changes that agree better do so by chance
 _MOVED = 0.01  # of a surface's greatest motion: below it, shares of the motion have no meaning
 
 
@@ -53,7 +54,7 @@ def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats
 def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:
     """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by metric and statistic (``names``):
     at least their average share of the ``deviations`` (f,) of the runs from each other, over the frames and the statistics of
-    their metric.
+    their metric, and half of it where they are averages.
 
     By the triangle inequality, changes of the same places differ by at most their deviation, and by less as most of it is not
     along the displacement or cancels. One statistic alone does not show how much less: its difference may be small by chance,
@@ -65,8 +66,9 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
     by_name, sizes = dict(zip(names, deviations, strict=True)), []
     for (metric, statistic), found, deviation in zip(names, changes, deviations, strict=True):
-        size = np.maximum(np.abs(found), means[metric] * deviation)
         kind = statistic.partition("_")[0]
+        share = means[metric] if kind in _OF_ONE_PLACE else max(means[metric], _LEAST)
+        size = np.maximum(np.abs(found), share * deviation)
         average = statistic.replace(kind, _OF_ONE_PLACE.get(kind, kind))
         sizes.append(np.maximum(size, by_name.get((metric, average), size)) if kind in _OF_ONE_PLACE else size)
     return sizes

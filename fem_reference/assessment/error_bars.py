@@ -141,12 +141,11 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         changes = _less(measured(run, None), measured(other, None))
         return {"change": changes, "deviation": _less(against_run, against_itself)}
 
-    count = len(context.fibres)
     statistics = measured(surface(pair.fine), surface(pair.fine))
     own = measured(pair.fine, None)
     moved = _rms_of_surface(statistics, [one.values for one in measured(surface(pair.fine), None)])
-    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics, count, moved)}
-    sizes |= {name: _sizes(differences(run, pair.coarse), statistics, count) for name, run in pair.varied.items()}
+    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics, moved)}
+    sizes |= {name: _sizes(differences(run, pair.coarse), statistics) for name, run in pair.varied.items()}
     outside = carried(pair.fine, moved)
     exact = None if pair.exact is None else differences(pair.exact, pair.coarse)
     bars = []
@@ -172,31 +171,29 @@ def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | N
     return np.fmax.reduce(known) if known else None
 
 
-def _sizes(
-    differences: _Differences, statistics: tuple[Measure, ...], fibres: int, moved: Floats | None = None
-) -> _Differences:
-    """The sizes of the signed ``differences`` of ``statistics`` between two runs with so many ``fibres``, whose surfaces have
-    ``moved`` (f,) [mm].
-    """
+def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
+    """The sizes of the signed ``differences`` of ``statistics`` between two runs whose surfaces have ``moved`` (f,) [mm]."""
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]
     changes = typical_changes(differences["change"], deviations, kinds)
+    spreads = dict(zip(kinds, deviations, strict=True))
     sizes: _Differences = {"change": changes, "deviation": deviations}
-    return {of: _pooled(_averaged(dict(zip(kinds, size, strict=True)), fibres), kinds) for of, size in sizes.items()}
+    return {of: _pooled(_averaged(size, kinds, spreads), kinds) for of, size in sizes.items()}
 
 
-def _averaged(sizes: dict[tuple[str, str], Floats], fibres: int) -> list[Floats]:
-    """The ``sizes`` (f,) of differences by metric and statistic: of a signed mean over ``fibres`` at least the standard error of a
-    mean, their root mean square over the root of their number. Errors of fibres cancel by chance in one pair of runs only.
+def _averaged(
+    sizes: list[Floats], kinds: list[tuple[str, str]], spreads: dict[tuple[str, str], Floats]
+) -> list[Floats]:
+    """The ``sizes`` (f,) of differences by metric and statistic; of a signed mean over fibres at least the root mean square of
+    their deviations, which ``spreads`` have. Fibres beside each other err alike, and cancel by chance in one pair of runs only.
     """
-    spreads = [
-        sizes.get((metric, statistic.replace("mean", "rms")), size) for (metric, statistic), size in sizes.items()
-    ]
-    return [
-        np.maximum(size, spread / math.sqrt(fibres)) if described()[kind].local else size
-        for (kind, size), spread in zip(sizes.items(), spreads, strict=True)
-    ]
+    found = []
+    for size, (metric, statistic) in zip(sizes, kinds, strict=True):
+        of_fibres = "mean" in statistic and described()[metric, statistic].local
+        spread = spreads.get((metric, statistic.replace("mean", "rms")), size)
+        found.append(np.maximum(size, spread) if of_fibres else size)
+    return found
 
 
 def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
@@ -231,7 +228,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
     if not place.exists():
         return None
     try:
-        table = texts.read_json(place, "the error bar of a stored run (--error-bar makes it anew)")
+        table = texts.read_json(place, "the error bar of a stored run (--error-bar computes it again)")
         if table["format"] != FORMAT or table["of"] != of:
             return None
         bars = TypeAdapter(ErrorBars).validate_python(table | {"sizes": table["sizes_mm"]})
@@ -240,7 +237,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
                 raise ValueError(f"the bar of {bar.metric}.{bar.statistic}")
         return bars
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
+        raise InputError(place, repr(error), "the error bar of a stored run (--error-bar computes it again)") from error
 
 
 @dataclass(frozen=True, eq=False)

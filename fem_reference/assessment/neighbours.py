@@ -9,7 +9,9 @@ from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, wors
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.geometry.skins import edge_lengths
+from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.problems.touching import pressure_name
 from fem_reference.runs.store import Run
 
 # Facets of tetrahedra are curved, and their corners are straight: where two are pressed, this share of an edge lies between.
@@ -22,9 +24,11 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     """
     if not problem.apart:
         return ()
-    checks = list[RunCheck]()
-    pressures = np.nan_to_num(run.scalars.get("touching_pressure", np.zeros(len(run.numbers))))
+    checks, none = list[RunCheck](), np.zeros(len(run.numbers))
     for pair in combinations(problem.spans, 2):
+        own = pressure_name(*(called(span.name, "free") for span in pair))
+        touch = (pair[0].name, pair[1].name) in problem.pairs
+        pressures = run.scalars.get(own, run.scalars.get("touching_pressure", none)) if touch else none
         skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
         edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
         law = problem.law
@@ -33,7 +37,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
             if now is None:
                 continue
             depth, place = penetration(*(one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)))
-            give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
+            give = 0.0 if law is None else float(np.nan_to_num(pressures[i])) / law.stiffness + law.smoothing
             allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
             name = f"{pair[0].name} and {pair[1].name} in each other"
             checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))

@@ -10,7 +10,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from fem_reference.effects import in_situ
+from fem_reference.effects import in_situ, touching
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances, flattened
@@ -35,8 +35,7 @@ _STRAIN = 3.0
 _SPRINGS = 1.5
 # The greatest rotation of a bone per load step, on average between two frames: beyond it the direction is unknown.
 _TURN = 1.01 * math.pi / 2
-# Between contact points, half a spacing apart, a right-angled edge penetrates by a quarter of it. There is no self-contact:
-# the surface may reach through itself as far as its creases do.
+# Between contact points, half a spacing apart, a right-angled edge penetrates by a quarter of it, and a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
 # Contact gives way where a bone is deeper than this share of half its thickness, for any stiffness.
 _GIVEN_WAY = 0.75
@@ -63,8 +62,7 @@ class RunCheck:
     @property
     def share(self) -> float:
         """The value over the allowed one; infinite where either is not a number."""
-        share = self.value / self.allowed
-        return math.inf if math.isnan(share) else share
+        return math.inf if math.isnan(share := self.value / self.allowed) else share
 
     def __str__(self) -> str:
         value, allowed = ("not a number" if one is None else f"{one:.3g}" for one in (self.value, self.allowed))
@@ -101,13 +99,14 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, and what is between contact points."""
+    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, what is between points, and is left from rest."""
     for law in body.touching:
-        apart = longest_edge(body.mesh, law) / 4
+        apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
+        at_rest = depth(body.mesh.points) if law.relaxed else 0.0
         for state in solved.states:
-            given = law.smoothing + state.scalars.get("touching_pressure", 0.0) / law.stiffness + _BETWEEN * apart
-            depth = overlap_at(body.mesh, law, state.points)
-            yield RunCheck(f"{law.one} in {law.other}", depth, given, "mm", state.number)
+            pressure = state.scalars.get(law.pressure_name, state.scalars.get("touching_pressure", 0.0))
+            given = law.smoothing + pressure / law.stiffness + _BETWEEN * apart + law.allowance(state.number) * at_rest
+            yield RunCheck(f"{law.one} in {law.other}", depth(state.points), given, "mm", state.number)
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
@@ -123,7 +122,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
         scalars = {name: values[1:] for name, values in run.scalars.items()}
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
-    crossed = chain(_depths(problem, run, nodes), _creases(run))
+    crossed = chain(_depths(problem, run, nodes), _creases(problem, run))
     return (*found, *worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
 
 
@@ -285,9 +284,11 @@ def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> 
     return pressure / problem.contact.stiffness + known + _BETWEEN * apart
 
 
-def _creases(run: Run) -> Iterator[RunCheck]:
-    """Self-penetration of the muscle's surface where there is none at rest."""
-    triangles, allowed = run.surface.triangles, np.array([_CREASE * spacing(run.surface)])
+def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
+    """Self-penetration of the muscle's surface where there is none at rest; where it touches itself, up to the give of contact."""
+    triangles, law, none = run.surface.triangles, touching.among(problem.effects), np.zeros(len(run.numbers))
+    gives = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
+    gives += _CREASE * spacing(run.surface)
     at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))
     for i, number in _states(run, ()):
         pairs = self_crossings(run.surface.moved_to(run.positions[i]))
@@ -296,4 +297,4 @@ def _creases(run: Run) -> Iterator[RunCheck]:
         reach = overlaps(one, other)
         worst = [np.argmax(reach)] if len(reach) else []
         values, places = (reach[worst], one[worst, 0]) if len(reach) else (np.zeros(1), run.positions[i][:1])
-        yield _at("the muscle through itself", values, allowed, number, places)
+        yield _at("the muscle through itself", values, gives[[i]], number, places)

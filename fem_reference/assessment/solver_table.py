@@ -60,7 +60,8 @@ def _file() -> _File:
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
     against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
-    parameters that somebody must give it, by where they are given; empty where that is not known.
+    parameters that somebody must give it, by where they are given; empty where that is not known. ``unsound``: why its frames are
+    no answer, empty where they are one.
     """
 
     kind: str
@@ -74,6 +75,7 @@ class SolverResult:
     machine: str
     of_reference: bool = False
     needs: Mapping[str, int] = field(default_factory=dict)
+    unsound: str = ""
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
         """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
@@ -148,7 +150,7 @@ class Table:
         """The order of solvers on a case, as far as the reference's error bars separate them; empty without bars."""
         here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
-        return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
+        return rankings({one.name: one.measures for one in here if not (one.of_reference or one.unsound)}, bars)
 
     def speed(self, kind: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario with the most triangles for which the time per frame [s] of ``name`` is known, and that time."""

@@ -46,7 +46,7 @@ def main(arguments: list[str]) -> int:
         _explain(str(error).partition("\n")[0], options)
         return SOLVER_FAILED if isinstance(error, MissingSoftware) else BAD_INPUT
     except KeyboardInterrupt:
-        said = "interrupted; what is stored stays, and a run of the reference goes on next time"
+        said = "interrupted; stored results are kept, and a run of the reference continues next time"
         print(f"fem-reference: {said}", file=sys.stderr)
         return INTERRUPTED
     except SystemExit:

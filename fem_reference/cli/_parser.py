@@ -40,16 +40,16 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--unit": {"help": "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"},
     "--solver-command": {
         "metavar": "COMMAND",
-        "help": "your own solver as a candidate: a command with {scene} and {out}, and settings in braces that the candidate.toml "
-        "here describes",
+        "help": "your own solver as a candidate: a command with {scene} and {out}, and settings in braces that a "
+        "candidate.toml describes",
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press",
+        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact where bones press",
     },
     "--negative-control": {
         "action": "store_true",
-        "help": "with the one change of the case that must turn its verdict to fail",
+        "help": "apply the change of the case that must turn its verdict to fail",
     },
     "--name": {
         "dest": "page_name",
@@ -61,10 +61,10 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "N",
         "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
     },
-    "--workers": {"type": int, "default": 1, "metavar": "N", "help": "how many runs are made at once (default: 1)"},
+    "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of runs made at once (default: 1)"},
     "--scheduler": {
         "metavar": "ADDRESS",
-        "help": "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too",
+        "help": "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they need access to --out",
     },
 }
 
@@ -92,7 +92,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        # What a verb is for is read from its file: to import it takes long.
+        # The purpose of a verb is read from its file, as importing it takes long.
         body = ast.parse((_FOLDER / f"{name}.py").read_bytes()).body
         assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
         text = ast.literal_eval(assigned["HELP"])
@@ -109,7 +109,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
     sub.set_defaults(limit=[], writes=True, page_name=None)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
-    sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
+    sub.add_argument("--json", type=Path, metavar="FILE", help="write the printed results as JSON")
     sub.add_argument("--quiet", action="store_true", help="show no progress")
 
 

@@ -11,7 +11,7 @@ from fem_reference.report import calibration_texts
 from fem_reference.studies import calibration
 from fem_reference.studies.campaign import Workers
 
-HELP = "fit parameters of a case to measured forces, lengths or places, with confidence intervals"
+HELP = "fit parameters of a case to measured forces, lengths or positions, with confidence intervals"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -25,8 +25,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit parameters on the quick size of a case, except for what ``--set`` says; status 1 where one is not determined, the law
-    does not follow the data or the fit has not converged, and 3 where a run that it needs has no answer.
+    """Fit parameters on the quick size of a case, which ``--set`` overrides; status 1 where a parameter is not determined, the
+    law does not fit the data or the fit has not converged, and 3 where a run that the fit needs failed.
     """
     scene = muscle_case(options.case, options, quick=True)
     workers = Workers(options.workers, options.scheduler)

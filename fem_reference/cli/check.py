@@ -17,7 +17,7 @@ from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import refinement
 
-HELP = "judge a candidate against its own past and against the reference, for a pipeline"
+HELP = "judge a candidate against its earlier results and against the reference, for a pipeline"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -26,9 +26,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    past = "its measures as they were, JSON"
+    past = "JSON file of its earlier measures"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
-    anew = "write the baseline anew from the current measures; its tolerances and limits stay"
+    anew = "rewrite the baseline from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst judgements for a pull request")

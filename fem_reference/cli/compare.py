@@ -26,13 +26,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames; may be repeated"
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)
-    ours = "a solver of ours as a candidate, with its standard settings where the case has none; may be repeated"
+    ours = "a shipped solver as a candidate, with its standard settings where the case has none; may be repeated"
     parser.add_argument("--solver", action="append", default=[], metavar="NAME", help=ours)
     share(parser, "--solver-command")
-    past = "what the candidate was, and write the page of what changed: a baseline of check, a stored run, a folder of frames"
+    past = "write the page of what changed since earlier results: a baseline of check, a stored run, a folder of frames"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
-    limit = "judge candidates: how far a statistic may deviate, such as surface_deviation.max='5 mm'; may be repeated"
+    limit = "judge candidates: greatest deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
     share(parser, "--error-bar", "--negative-control", "--name", "--ranks")
 
@@ -58,7 +58,7 @@ def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")
     if options.limit:
-        raise InputError("--limit", "with --against", "one of the two: check judges a candidate by its past")
+        raise InputError("--limit", "with --against", "one of the two: check compares with earlier results")
     ((entry, place),) = chosen
     bench, path = checked_bench(scene, options, chosen), options.against
     if path.is_file() and path.suffix == ".json":

@@ -7,7 +7,7 @@ from fem_reference.cli._parser import share
 from fem_reference.scenes import casefile
 
 MAIN_JOB = "hip_flexion"
-HELP = "the main job: the case hip_flexion, its reference against its candidates"
+HELP = "run the main job: compare the candidates of the case hip_flexion with its reference"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -23,16 +23,16 @@ PARAVIEW = "paraview"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb: where to, and in which formats."""
+    """Options of the verb: the folder, and the formats."""
     share(parser, "case", "--set")
-    folder = "a folder that is not there yet, or empty"
+    folder = "a new or empty folder"
     parser.add_argument("--to", type=Path, required=True, metavar="DIR", help=folder)
-    forms = "open formats alone (default); FEBio's own besides; or the reference, solved, and candidates for ParaView"
+    forms = "only open formats (default); FEBio's format too; or the solved reference and candidates for ParaView"
     parser.add_argument("--format", choices=(*export.FORMATS, PARAVIEW), default="open", help=forms)
     either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    again = f"for {PARAVIEW}: solve the reference again where it was solved before without its states"
+    again = f"for {PARAVIEW}: solve the reference again where its stored run has no states"
     parser.add_argument("--solve", action="store_true", help=again)
     share(parser, "--ranks")
 

@@ -12,7 +12,7 @@ from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING, Case
 
-HELP = "list cases and whether their data is here, solvers with their settings, metrics, stored runs"
+HELP = "list cases and whether their data is installed, solvers with their settings, metrics, stored runs"
 REQUIRED = "required"
 
 

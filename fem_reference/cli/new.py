@@ -10,19 +10,19 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.units import LENGTH_UNITS
 from fem_reference.studies import new_scene
 
-HELP = "write a scene to begin with: a copy of a case, or one of your own muscle and bones"
+HELP = "write a scene to start from: a copy of a case, or one of your own muscle and bones"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has; it writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
-    parser.add_argument("name", metavar="NAME", type=Path, help="the folder that is made; its name is the scene's name")
-    parser.add_argument("--from", dest="case", metavar="CASE", help="a case that is copied (default: hip_flexion)")
-    muscle = "triangles of a muscle, closed (STL, PLY, OBJ, VTP, ...)"
+    parser.add_argument("name", metavar="NAME", type=Path, help="the folder to create; its name is the scene's name")
+    parser.add_argument("--from", dest="case", metavar="CASE", help="the case to copy (default: hip_flexion)")
+    muscle = "closed triangle surface of a muscle (STL, PLY, OBJ, VTP, ...)"
     parser.add_argument("--muscle", type=Path, metavar="FILE", help=muscle)
-    bones = "triangles of a bone, whose name is that of the file; at least two, each with its --bone"
+    bones = "triangle surface of a bone, named after the file; give --bone at least twice"
     parser.add_argument("--bone", type=Path, action="append", default=[], metavar="FILE", help=bones)
-    unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed by the sizes of all of them, and said)"
+    unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed from the sizes of all of them, and printed)"
     parser.add_argument("--unit", metavar="UNIT", help=unit)
 
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         found = new_scene.of_surfaces(folder, options.muscle, options.bone, options.unit)
         unit = {"unit": found.name} | ({"unit_guessed": found.why} if found.why else {})
-        said = f"lengths are in {found.name}, guessed: {found.why}; --unit says it\n" if found.why else ""
+        said = f"lengths are in {found.name}, guessed: {found.why}; --unit states it\n" if found.why else ""
     place = shlex.quote(str(folder if len(folder.parts) > 1 else f"./{folder}"))
     call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # as it was called
     text = f"{said}{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"

@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     names = sorted(_PAGES)
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
-    some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: this case, not all of them; may be repeated"
+    some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: only this case (default: all); may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
@@ -120,7 +120,7 @@ def _estimation(options: argparse.Namespace) -> int:
         found = estimation.estimate(scenes, out(options) / "runs" if options.solve else None)
     if not found.fits:
         got = "; ".join(f"{case}: {why}" for case, why in found.missing.items())
-        raise InputError(ESTIMATION, f"no case that can be measured ({got})", "one whose files are there")
+        raise InputError(ESTIMATION, f"no case that can be measured ({got})", "one whose files are installed")
     printed = [estimation_page.said(found), *(f"left out: {case}: {why}" for case, why in found.missing.items())]
     page = estimation_page.page(found)
     asked = _asked(scenes, options, [Part(("--solve",), "solved")] if options.solve else [])

@@ -27,11 +27,11 @@ HELP = "recommend a solver and setting for an error or a time, from the results 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
     share(parser, "case", "--set")
-    error = "the greatest error that you can do with, in the unit of the metric, such as '2 mm' or '1 %%'"
+    error = "the greatest error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)
-    time = "the longest time for a frame that you can wait, such as '5 ms' or '60 fps'"
+    time = "the longest time for a frame that you accept, such as '5 ms' or '60 fps'"
     parser.add_argument("--time", metavar="VALUE", help=time)
-    metric = f"what the error is of (default: {MAIN})"
+    metric = f"the statistic whose error counts (default: {MAIN})"
     parser.add_argument("--metric", default=MAIN, metavar="METRIC.STATISTIC", help=metric)
 
 

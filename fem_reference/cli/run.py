@@ -20,9 +20,9 @@ HELP = "solve a case and judge its expectations of the reference"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     share(parser, "case", "--set")
-    parser.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
+    parser.add_argument("--solver", metavar="NAME", help="a solver other than the case's own reference")
     share(parser, "--error-bar", "--ranks", "--negative-control", "--name")
-    explain = "say of each effect whether the case needs it and why, and solve nothing"
+    explain = "report whether and why the case needs each effect, without solving it"
     parser.add_argument("--explain", action="store_true", help=explain)
 
 

@@ -12,7 +12,7 @@ from fem_reference.report.asked import Asked, Part
 from fem_reference.scenes.case import COMMAND
 from fem_reference.studies.hard import records, running
 
-HELP = "run the hard cases by every solver, and write a page that shows which solvers stay stable"
+HELP = "run the hard cases with every solver, and write a page that shows which solvers stay stable"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
-    meshes = "run the reference on so many other meshes of each case as well, a little different at random"
+    meshes = "run the reference on N randomly perturbed meshes of each case as well"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
     share(parser, "--solver-command", "--name")
 

@@ -12,7 +12,7 @@ from fem_reference.report.words import duration
 from fem_reference.scenes import casefile
 from fem_reference.studies.features import expected
 
-HELP = "check all of a case that can be checked before it is solved, and say what running it will cost"
+HELP = "check all of a case that can be checked before it is solved, and estimate the cost of running it"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -14,14 +14,14 @@ from fem_reference.report.asked import Asked, Part
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
 
-HELP = "measure problems whose answers are known and write the page"
+HELP = "measure problems with known answers, and write the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     known = "an entry, a group or a shell pattern of them (default: all)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
-    control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
+    control = "measure this entry with its deliberate mistake, with which it must fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
     share(parser, "--name")
 

@@ -126,7 +126,7 @@ class Energy(Effect):
         return type(self).__name__ + (f" in {self.region}" if self.region else "")
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``, of a point that is wholly in its region."""
+        """Energy per rest volume [MPa] at ``state``, of a point that is fully in its region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
     def weighted(self, state: State) -> Any:

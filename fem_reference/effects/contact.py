@@ -15,10 +15,10 @@ class Contact(Interaction):
     """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
-    distance below which a bone is felt. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
-    distance within which a bone may press at rest, through what lies between and is in no mesh, as a capsule or a bursa; by
-    default it does where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact
-    is frictionless.
+    distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
+    distance within which a bone may press at rest, through tissue between them that is not meshed, such as a capsule or a bursa;
+    by default only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it
+    contact is frictionless.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}

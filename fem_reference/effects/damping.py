@@ -1,4 +1,4 @@
-"""Drag of the ground on moving tissue: a free body does not drift away, and a body leaves an unstable state gradually."""
+"""Drag of the ground on moving tissue: it keeps a free body from drifting, and a body leaves an unstable state gradually."""
 
 from typing import Any, ClassVar
 

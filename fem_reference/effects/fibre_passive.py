@@ -19,14 +19,14 @@ _SOURCE = (
 
 class FibrePassive(PassiveFibres):
     """``dW/dl = stress f(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``f = 0`` up to 1,
-    ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the line that goes on from there.
+    ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the tangent line.
 
     ``stress`` [MPa]: the peak active stress, by which Blemker normalises; ``p1``, ``p2``: without unit; ``optimal_stretch``: the
     fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
 
     Valid for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
-    data of longer fibres stands behind this law. Slack fibres are without limit.
+    data of longer fibres supports this law. Slack fibres have no limit.
     """
 
     example: ClassVar[dict[str, Any]] = {

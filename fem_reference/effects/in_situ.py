@@ -15,8 +15,8 @@ class InSitu(Prestrain):
     Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
     turns with the body. They are strain and pressure of an isotropic body under the forces that act at rest, of the shear and
     bulk modulus at rest of the scene's effects: of all stresses that balance these forces, the one of least energy. Springs of
-    attachments are extended at rest, and bones press there, as those on which that body stands: a bone wherever the muscle
-    touches it or is within ``support`` of it (``contact``), through what lies between.
+    attachments are extended at rest, and bones press there, like supports of that body: a bone wherever the muscle
+    touches it or is within ``support`` of it (``contact``), through the tissue between.
 
     ``stretch``: without unit, above 1 where fibres are taut at rest; 1 where only an activation acts there.
     Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find by iteration a prestrain with this

@@ -12,8 +12,8 @@ class Incompressible(VolumeLaw):
 
     Valid for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` is steepest at 1/2: below it each shrinking
     by the same factor meets less resistance, and U stays below K/2 down to J = 0, so that isochoric energies can shrink a body to
-    almost nothing (``verification/squeeze.py`` has an example). Above 1 the law has no such end; there 2 is as far from 1 as 1/2
-    is, by the logarithm, and far beyond what water-filled tissue does.
+    almost nothing (``verification/squeeze.py`` has an example). Above 1 the law has no such limit; 2 is as far from 1 as 1/2
+    in the logarithm, and far beyond what water-filled tissue does.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)

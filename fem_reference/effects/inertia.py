@@ -16,7 +16,7 @@ class Inertia(Energy):
     Of the generalised-alpha family that is the method in which stresses are those at the end of a step (Wood, Bossak and
     Zienkiewicz 1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
     ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``, of which r, ``spectral_radius``, is what a
-    step leaves of the shortest waves: 1 keeps them (the trapezoidal rule), 0 takes them away at once. Long waves keep their energy.
+    step leaves of the shortest waves: 1 keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy.
     A step then ends where ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies are least: a potential of the step,
     which no material stores.
 

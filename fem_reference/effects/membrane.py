@@ -17,8 +17,8 @@ class Membrane(Load):
     ``on``: the part of the surface, and ``in`` a region, if any, by the share that it has of this part, linear between the vertices
     of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].
 
-    Stretched by l in all directions it has the tension ``h mu (1 - l^-6)`` per present length. Where it is compressed it would
-    wrinkle, which it resists here instead: as a sheet that the tissue below holds flat.
+    Stretched by l in all directions it has the tension ``h mu (1 - l^-6)`` per present length. In compression it would
+    wrinkle; here it resists instead, like a sheet that the tissue below keeps flat.
     """
 
     outer: ClassVar[bool] = False

@@ -1,18 +1,29 @@
-"""Frictionless contact of the muscles of a scene with each other, with any sliding; attached parts are exempt."""
+"""Contact of the muscles of a scene with each other, or of a single one with itself; attached parts are exempt."""
 
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from fem_reference.effects import Interaction
+from pydantic import Field
+
+from fem_reference.effects import Effect, Interaction
 from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """A pressure of the gap between two muscles, on both alike; see ``fem_reference.problems.touching.Touching`` for the law.
+    """A pressure of the gap between two muscles, on both alike, or between places of a single one, with any sliding; see
+    ``fem_reference.problems.touching.Touching`` for the law.
 
     ``stiffness`` [MPa/mm]: under the pressure p the two overlap by at most p / stiffness. ``smoothing`` [mm]: the distance below
-    which a muscle is felt, and the most by which two may overlap at rest. Only in scenes of several muscles.
+    which a muscle is felt, and the most by which two may overlap at rest. ``friction``: the coefficient of Coulomb's law, greater
+    than 0; without it contact is frictionless. Several muscles touch each other, and none touches itself.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}
     stiffness: AreaStiffness
     smoothing: PositiveLength
+    friction: float | None = Field(default=None, gt=0)
+
+
+def among(acting: Iterable[Effect]) -> MuscleContact | None:
+    """The contact of muscles among the effects of a scene, None where there is none."""
+    return next((effect for effect in acting if isinstance(effect, MuscleContact)), None)

@@ -17,7 +17,7 @@ def check(folder: Path) -> None:
     """Raise InputError unless ``folder`` is missing or empty."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         got = f'"{folder}", {"a file" if folder.is_file() else "which is not empty"}'
-        raise InputError("--to", got, "a folder that is not there yet, or empty")
+        raise InputError("--to", got, "a new or empty folder")
 
 
 @contextmanager

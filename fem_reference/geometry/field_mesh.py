@@ -67,7 +67,7 @@ def check(mesh: FieldMesh) -> FieldMesh:
     """``mesh`` itself; InputError for non-finite numbers, wrong indices, unused vertices, flat cells, edges of three triangles."""
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
-        raise InputError(mesh.place, "a coordinate that is no finite number", "finite coordinates")
+        raise InputError(mesh.place, "a coordinate that is not a finite number", "finite coordinates")
     if np.abs(mesh.points).max(initial=0.0) > FURTHEST:
         raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates whose squares are numbers")
     if mesh.cells.size == 0 or mesh.cells.min() < 0 or mesh.cells.max() >= count:

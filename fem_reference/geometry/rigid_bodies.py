@@ -113,7 +113,7 @@ class _Rod(Exact):
         kind = type(self).__name__.lower()
         _check_length(f"{kind}: radius", self.radius)
         if not np.linalg.norm(np.subtract(self.end, self.start)) > 0:
-            raise InputError(f"{kind}: end", self.end, "another point than the start")
+            raise InputError(f"{kind}: end", self.end, "a point other than the start")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from fem_reference.geometry.obstacles import Ring, SmoothSurface
 
 Flags = NDArray[np.bool_]
 
-# Pieces of a string, its sweeps, and how far beyond the middle of its neighbours they take a point.
+# Pieces of a string, sweeps over it, and their factor of overrelaxation: 1 takes a point to the middle of its neighbours.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
 # Where a string needs more points than this, so that no piece slips past a thin tube, it is not followed further.
 MOST = 10_000
@@ -21,7 +21,7 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
     """Points (n, N, 3) of strings that are nearly taut: each in the middle of its neighbours, or on an obstacle."""
     rings = [one for one in obstacles if isinstance(one, Ring)]
     string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
-    # A little aside, as a point in the middle of an obstacle has no side to go to.
+    # Points are moved aside a little: a point in the middle of an obstacle has no direction out of it.
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
     for ring in rings:  # no piece may slip past a tube
@@ -60,7 +60,7 @@ def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
 
 
 def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, ...]]:
-    """The obstacles that each path may meet, in turn."""
+    """The obstacles that each path may meet, in their order along it."""
     flags = np.array([touching(obstacle, halved(string)) for obstacle in obstacles])
     count = flags.sum(axis=2)
     middle = (flags * np.arange(flags.shape[2])).sum(axis=2) / np.maximum(count, 1)

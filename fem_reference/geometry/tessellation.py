@@ -11,7 +11,7 @@ from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpac
 
 # Sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
 TURN = 64
-# For a half-space, the half side of its square from the middle of nearby points, and its thickness, over the size of these.
+# For a half-space, half the side of its square and the thickness of its slab, each over the size of the nearby points.
 _REACH, _THICKNESS = 1.5, 0.1
 
 

@@ -256,6 +256,6 @@ def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
     try:
         return read(path)
     except MemoryError as error:
-        raise InputError(path, "more than there is memory for", want) from error
+        raise InputError(path, "more than fits into memory", want) from error
     except Exception as error:  # the readers of foreign packages raise whatever occurs to them
         raise InputError(path, str(error) or type(error).__name__, want) from error

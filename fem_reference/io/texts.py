@@ -1,6 +1,6 @@
 """TOML, JSON and XML from files that anybody may have written: bounded in size and depth, so that reading them ends.
 
-A file is refused where it is no such text, is too large, is nested deeper than anything of ours, or names files elsewhere.
+A file is refused if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
 
 import json
@@ -18,16 +18,16 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# How large files may be [bytes]. A case file has some kB, a baseline 1.3 kB a frame; what is read takes up to thirty times as much.
+# How large files may be [bytes]. A case file has some kB, a baseline 1.3 kB a frame; its content takes up to thirty times as much.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
 # How deep tables and lists may be nested; case files go to 6.
 DEEPEST = 32
 # A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
-# What in TOML is no key: strings of its four kinds, and comments.
+# Parts of TOML that are not keys: strings of its four kinds, and comments.
 _NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
-# A dotted key of so many parts takes the square of its length to read.
+# Reading a dotted key takes time that grows as the square of its number of parts.
 _LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{DEEPEST},}}")
 
 
@@ -46,7 +46,7 @@ def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
 
 
 def toml_text(text: str) -> str:
-    r"""``text`` as a basic string of TOML, which has the escapes of JSON's, and one of the last character of ASCII too.
+    r"""``text`` as a basic string of TOML: JSON's escapes are valid in it, and the character DEL must be escaped too.
 
     >>> print(toml_text('a "b"'))
     "a \"b\""
@@ -55,7 +55,7 @@ def toml_text(text: str) -> str:
 
 
 def read_json(path: Path, want: str) -> Any:
-    """The value of a JSON file, ``want`` of messages; numbers that are not finite are none."""
+    """The value of a JSON file; InputError with ``want`` for any other file, also for one with NaN or Infinity."""
     return _parsed(partial(json.loads, parse_constant=_no_number), _text(path, MOST_JSON, want), path, want)
 
 
@@ -105,7 +105,7 @@ def plain(value: Any) -> Any:
 
 
 def is_file(path: Path) -> bool:
-    """True where it is one; False also where a name is longer than names of files can be."""
+    """True where the path is a file; False also where its name is too long for a file."""
     try:
         return path.is_file()
     except OSError:
@@ -123,7 +123,7 @@ def _text(path: Path, most: int, want: str) -> str:
         raise InputError(path, "no file", want)
     try:
         check_size(path, most, want)
-        return path.read_text(encoding="utf-8-sig")  # some editors begin a text with the mark of its order of bytes
+        return path.read_text(encoding="utf-8-sig")  # some editors write a byte order mark
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, str(error), want) from error
 

@@ -26,7 +26,7 @@ OF, AGAINST = "lines", "itself"
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the place of an end less that to which the
-    pose of its bone takes its rest position, also where a tendon goes on to the bone. Nothing where the muscle is not attached.
+    pose of its bone takes its rest position, also where a tendon continues to the bone. Nothing where the muscle is not attached.
     """
     if context.ends is None:
         return ()

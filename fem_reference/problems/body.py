@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fem_reference.effects import Effect, regions_named
+from fem_reference.effects import Effect, in_situ, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
@@ -210,8 +210,19 @@ class Body:
     @property
     def first(self) -> float:
         """The first requested frame: an overlap at rest is relaxed before it."""
-        relaxed = [law.relaxed for law in self.touching] + ([self.contact.relaxed] if self.contact else [])
-        return next((frames[1] for frames in relaxed if frames is not None), self.frames[0])
+        return next((frames[1] for frames in self._relaxed), self.frames[0])
+
+    @property
+    def _relaxed(self) -> list[tuple[float, float]]:
+        """The frames between which overlaps at rest are removed."""
+        found = [law.relaxed for law in self.touching] + ([self.contact.relaxed] if self.contact else [])
+        return [frames for frames in found if frames is not None]
+
+    @property
+    def begun(self) -> bool:
+        """True where it begins elsewhere than at rest, or under tension."""
+        tense = in_situ.among(self.effects) is not None
+        return self.start is not None or tense or (self.contact is not None and self.contact.in_situ is not None)
 
     @property
     def rubs(self) -> bool:
@@ -243,8 +254,12 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which load steps end, to skip no motion; InputError where a path cannot be followed."""
+        """Frame numbers at which load steps end, to skip no motion and no end of an overlap at rest; InputError where a path cannot
+        be followed.
+        """
         things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)
-        return stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
+        found = stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
+        ends = {last for _, last in self._relaxed if self.frames[0] < last < self.frames[-1]}
+        return tuple(sorted({*found, *ends}))

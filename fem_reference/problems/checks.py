@@ -132,7 +132,6 @@ def _check_rest(body: Body) -> None:
             raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
     if body.contact is not None and not isinstance(body.contact, ContactLaw):
         raise InputError("contact", said(body.contact), "a ContactLaw, or None")
-    friction.check(body.frictions, begun=body.start is not None)
 
 
 def _check_cells(mesh: Any) -> None:
@@ -243,12 +242,13 @@ def _check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon is beside tension at rest, two
-    regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be followed. They
-    are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon or friction is beside tension at
+    rest, two regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be
+    followed. They are compared at all frames, all stops, and the middles between them.
     """
     regions.check(body)
     tendons.check(body)
+    friction.check(body.frictions, begun=body.begun)
     ends = np.unique([*body.frames, *body.stops])
     sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]

@@ -136,7 +136,7 @@ def check_thickness(bones: Mapping[str, Obstacle], apart: float) -> None:
 
 def check_exempt(exempt: Exemption, place: str) -> None:
     """Raise InputError where most of the unattached surface is exempt from contact; warn where much of it is."""
-    got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of what is not attached, where no contact is felt"
+    got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")
     if exempt.lost > _LOST / 2:

@@ -26,7 +26,7 @@ class FibreEnds:
     ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that; ``covered`` (a,): the
     share of the area of each attachment that is within the mean spacing of fibres, sqrt(area / k), of an end that belongs to it.
 
-    An end that does not reach its attachment goes on by the tendon of that, where it has one.
+    A fibre whose end does not reach its attachment continues as the tendon of that, where it has one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -43,7 +43,7 @@ class FibreEnds:
 
     @property
     def beside(self) -> Bools:
-        """Mask (k, 2) of the ends that neither reach their attachment nor go on by a tendon."""
+        """Mask (k, 2) of the ends that neither reach their attachment nor continue as a tendon."""
         return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
 
     def taken(self, rest: Floats, frame: float) -> Floats:
@@ -69,7 +69,7 @@ class FibreEnds:
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The number of ends, of those that go on by a tendon, and of those beside their attachment, all of both by name; the share
+        """Numbers of ends, of those that continue as a tendon, and of those beside their attachment, all of both by name; the share
         of each attachment that they cover [%].
         """
         tied = np.isfinite(self.tendons[:, :, 0])

@@ -12,13 +12,13 @@ from fem_reference.foundations.mesh import Floats
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
     """Raise InputError where a coefficient of friction is no number above 0, None without; or where there is one in a body that has
-    ``begun`` elsewhere than at rest, as nothing holds its points yet.
+    ``begun`` elsewhere than at rest or under tension, as nothing holds its points yet.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):
             raise InputError("friction", one, "a number above 0, or None without friction")
         if begun:
-            raise InputError("friction", one, "none in a body that does not start at rest")
+            raise InputError("friction", one, "none in a body that does not start at rest, without tension")
 
 
 class Returned(NamedTuple):

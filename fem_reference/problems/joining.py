@@ -118,7 +118,7 @@ def _acting(
                 effects.append(effect.model_copy(update={"on": called(name, effect.on)}))
                 continue
             if not isinstance(effect, Energy) or "momentum" in effect.needs:
-                want = "it with the same numbers on all muscles"
+                want = "the same values on all muscles"
                 raise InputError(f"{name}: {effect.title}", "an effect that has no region", want)
             region = region_of(effect)
             where = called(name, region) if region else name
@@ -134,7 +134,7 @@ def _check_pressure(bodies: Mapping[str, Body]) -> None:
     brought = {name: {one for effect in body.effects for one in effect.unknowns} for name, body in bodies.items()}
     if len({frozenset(one) for one in brought.values()}) > 1:
         got = "; ".join(f"{name}: {', '.join(sorted(one)) or 'none'}" for name, one in brought.items())
-        raise InputError("effects", f"unknowns that differ ({got})", "the same of all muscles")
+        raise InputError("effects", f"unknowns that differ ({got})", "the same for all muscles")
 
 
 def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iterator[Prescribed]:
@@ -160,7 +160,7 @@ def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Contact
     skin = Skin(*(np.concatenate([getattr(one, key) for one in skins]) for key in ("cells", "points", "areas")))
     known = {(law.stiffness, law.smoothing, law.in_situ, law.friction) for law in laws.values()}
     if len(known) > 1 or len(laws) < len(bodies):
-        raise InputError("contact", "contact that differs or that some have not", "the same of all")
+        raise InputError("contact", "contact that differs between muscles or is missing in some", "the same for all")
     relaxed = next((law.relaxed for law in laws.values() if law.relaxed is not None), None)
     parts = tuple(zip(laws, ends, ends[1:], strict=False))
     some: ContactLaw = next(iter(laws.values()))

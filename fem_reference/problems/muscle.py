@@ -58,6 +58,7 @@ from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
 from fem_reference.problems.tendons import pulling
+from fem_reference.problems.touching import with_itself
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
 RELAXING = 10  # frame numbers before the first over which an overlap at rest is removed
@@ -119,7 +120,7 @@ class MuscleProblem(Setup):
             prescribed.append(Prescribed(name, self.attached_skins.get(name, name), (0, 1, 2), path, entry.stiffness))
         acting = tuple(effect for effect in self.effects if not isinstance(effect, Interaction))
         body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre, regions=self.regions)
-        body = replace(body, interval=self.interval, start=self.start)
+        body = replace(body, interval=self.interval, start=self.start, touching=with_itself(self.effects, "free"))
         if self.contact is not None:
             assert self.skin is not None  # built with the effect
             body = _among_bones(body, self.bones, self.skin, self.contact)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
 from fem_reference.geometry.distance import distances, inside
-from fem_reference.geometry.intersections import crossings, overlaps
+from fem_reference.geometry.intersections import crossings, overlaps, self_crossings
 from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
@@ -23,11 +23,15 @@ def overlap(body: Body, law: Touching) -> float:
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
     """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm], at least: the greatest of a
-    corner of either below the skin of the other's piece, and of facets that cross. Curved facets count by their corners, less what
-    they bulge.
+    corner of either below the skin of the other's piece, and of facets that cross; of a part with itself, of these alone. Curved
+    facets count by their corners, less what they bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
+    if law.one == law.other:
+        own = Surface(points, triangles[_among(facets, one)[owner]])
+        crossed = (points[own.triangles[some]] for some in self_crossings(own).T)
+        return float(overlaps(*crossed).max(initial=0.0)) - _bulge(mesh, points, one)
     piece = _pieces(mesh)
     depths, parts = [0.0], list[Surface]()
     for part, against in ((one, other), (other, one)):
@@ -48,13 +52,15 @@ def longest_edge(mesh: Cells, law: Touching) -> float:
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:
-    """The facets (f, 3 or 4) of the skin around the part ``other``, on its piece, that the part ``side`` may not touch."""
+    """The facets (f, 3 or 4) of the skin around the part ``other``, on its piece, that the part ``side`` may not touch;
+    none of a part that touches itself.
+    """
     mesh, facets = body.mesh, outer_facets(body.mesh)[0]
     laws = [(law.one, law.other) for law in body.touching]
     named = [mesh.facets[two] for one, two in [*laws, *(law[::-1] for law in laws)] if one == side]
     piece = _pieces(mesh)
     beside = np.isin(piece[facets[:, 0]], piece[mesh.facets[other]])
-    return np.asarray(facets[beside & ~_among(facets, np.concatenate(named))])
+    return np.asarray(facets[beside & ~_among(facets, np.concatenate(named)) & (side != other)])
 
 
 def _pieces(mesh: Cells) -> Ints:

@@ -37,7 +37,7 @@ def kept_distances() -> Path:
 @dataclass(frozen=True, eq=False)
 class Bone:
     """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
-    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, from which the surface has its vertices.
+    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, on which the vertices of the surface lie.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Joint:
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
     """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]; ``tendon`` (3,)
-    [mm]: the point of the bone at rest to which fibres go on that end beside them, if any.
+    [mm]: the point of the bone at rest to which fibres that end beside these vertices continue, if any.
     """
 
     attachment: str
@@ -97,8 +97,8 @@ class AttachedVertices:
 @dataclass(frozen=True, eq=False)
 class Setup:
     """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
-    frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the
-    first frame, by its rest positions (n, 3), where that is not at rest; ``joints``, about whose axes bones turn; ``regions``, by
+    frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, a function from rest
+    positions (n, 3) to those of the first frame, where these differ; ``joints``, about whose axes bones turn; ``regions``, by
     name those in which effects act.
     """
 
@@ -126,7 +126,7 @@ class Setup:
         return None
 
     def begin(self, rest: Floats) -> Floats:
-        """The places (n, 3) at the first frame of points that are at ``rest`` (n, 3) [mm]; an array of the caller's own."""
+        """Positions (n, 3) at the first frame of points that are at ``rest`` (n, 3) [mm]; a new array."""
         return np.array(rest) if self.start is None else np.array(self.start(rest))
 
     @cached_property

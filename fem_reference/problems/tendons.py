@@ -38,7 +38,7 @@ def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect
 
 
 def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> Prescribed:
-    """The springs of an ``effect``; InputError where no fibre goes on by its tendon."""
+    """The springs of an ``effect``; InputError where no fibre continues as its tendon."""
     number = [one.attachment for one in rest.attached].index(effect.on)
     entry, place = rest.attached[number], f"effect {effect.title}"
     if entry.tendon is None:
@@ -47,7 +47,7 @@ def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> P
     assert ends is not None  # of an attachment
     beyond = (ends.by == number) & np.isfinite(ends.tendons[:, :, 0])
     if not beyond.any():
-        raise InputError(place, "no fibre that goes on by it", "fibres that end beside the attachment")
+        raise InputError(place, "no fibre that continues as it", "fibres that end beside the attachment")
     away, _ = cKDTree(ends_of(fibres)[beyond]).query(rest.surface.points)
     shares = attached_shares(rest.surface, np.setdiff1d(np.flatnonzero(away <= effect.reach), rest.attached_vertices))
     skin = attached_skin(rest.surface, shares, mesh, spacing(rest.surface))

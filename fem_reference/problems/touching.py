@@ -6,6 +6,8 @@ from math import isfinite
 
 import numpy as np
 
+from fem_reference.effects import Effect
+from fem_reference.effects.touching import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, connected_parts
 from fem_reference.problems.contact import penalty, remaining
@@ -32,13 +34,31 @@ class Touching:
         """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
         return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
 
+    @property
+    def pressure_name(self) -> str:
+        """The name under which a frame of several laws reports the greatest pressure of this one."""
+        return pressure_name(self.one, self.other)
+
     def allowance(self, frame: float) -> float:
-        """The share of the overlap at rest that is subtracted at ``frame``."""
-        return 0.0 if self.relaxed is None else remaining(self.relaxed, frame)
+        """The share of the overlap at rest that is subtracted at ``frame``; of a part with itself always all, unless it is removed:
+        there is no pressure at rest.
+        """
+        return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
+
+
+def pressure_name(one: str, other: str) -> str:
+    """The name under which a frame of several laws reports the greatest pressure between two parts."""
+    return f"touching_pressure of {one} and {other}"
+
+
+def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
+    """The contact of a ``part`` with itself, where the effects ``acting`` in a single muscle have it."""
+    law = among(acting)
+    return () if law is None else (Touching(part, part, law.stiffness, law.smoothing, law.friction),)
 
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints]) -> None:
@@ -52,6 +72,6 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
         for name, value in (("stiffness", law.stiffness), ("smoothing", law.smoothing)):
             if not (isfinite(value) and value > 0):
                 raise InputError(f"touching[{i}].{name}", value, "a number above 0")
-        if len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
+        if law.one != law.other and len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
             got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
-            raise InputError(f"touching[{i}]", got, "regions of separate pieces, as no piece touches itself")
+            raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")

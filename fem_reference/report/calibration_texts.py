@@ -51,5 +51,5 @@ def _line(one: Estimate) -> str:
 def _remark(scatter: float) -> str:
     """The meaning of a scatter that is far from 1."""
     if scatter > FOLLOWED:
-        return ": the law does not follow the data"
+        return ": the law does not fit the data"
     return ": the data scatter less than they say" if scatter < _LITTLE else ""

@@ -105,10 +105,10 @@ def _drawing(arms: ArmsBeside) -> Drawing:
         )
         axes.plot(at, arms.middle, color=colour_of(1), label="their mean")
         if arms.is_curve:
-            axes.plot(at, known.low, "--", color="#333333", label="published")
+            axes.plot(at, known.low, "--", color="#1d1d1f", label="published")
         else:
-            axes.plot(at, known.low, "--", color="#333333", label="published range")
-            axes.plot(at, known.high, "--", color="#333333")
+            axes.plot(at, known.low, "--", color="#1d1d1f", label="published range")
+            axes.plot(at, known.high, "--", color="#1d1d1f")
         axes.set(xlabel="flexion of the hip, degrees", ylabel=f"moment arm of {arms.sense}, mm")
         axes.legend(fontsize="x-small")
 

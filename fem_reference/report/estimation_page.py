@@ -45,7 +45,7 @@ def said(found: Estimation) -> str:
     if found.curves:  # not where all fibres have few points
         errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
         best = min(errors, key=lambda name: float(errors[name]))
-        sentences.append(f"of curves through a few points of a fibre {best} deviates least")
+        sentences.append(f"Of curves through a few points of a fibre {best} deviates least")
     most = max((one.gaussians for one in found.fits), default=0)
     if fits := [one for one in found.fits if one.gaussians == most]:
         sentences.append(
@@ -77,7 +77,7 @@ def _figure() -> Drawing:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
             line = make(_POINTS)(np.linspace(0, 1, 400))
             axes.plot(*line.T, linewidth=1.4, **look_of(i + 1), label=name)
-        axes.plot(*_POINTS.T, "o", color="#333333", markersize=4)
+        axes.plot(*_POINTS.T, "o", color="#1d1d1f", markersize=4)
         axes.set(xlabel="x", ylabel="y")
         axes.legend(fontsize="x-small")
 

@@ -42,6 +42,7 @@ def comparison_text(result: Comparison) -> str:
     """The result of a comparison, line by line: its runs, its worst numbers and its verdicts."""
     runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in result.runs]
     runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
+    runs += [f"{name}: no answer, not ranked: {why}" for name, why in result.unsound.items()]
     checks = second_check.texts_of(result.reference)
     if checks and result.reference.outcome.status == "converged":
         runs.append(f"second check: passed, {len(checks)} checks")

@@ -130,7 +130,7 @@ def small_picture(text: str) -> str:
         return ""
     try:
         with Image.open(io.BytesIO(base64.b64decode(found[1]))) as picture:
-            small = picture.convert("RGB")
+            small = picture.convert("RGBA")
             small.thumbnail((_SIDE, _SIDE))
             return webp(small, 75)
     except (OSError, ValueError):

@@ -17,8 +17,9 @@ _NOTHING_TO_SAY = ("ok", "not applicable", "no solution")
 _SIDE, _OVERSAMPLING = 220, 2
 # The camera looks along this direction, from in front, above and to the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
-_PAPER, _MARK = "#ffffff", "#1f4fd8"
+_MARK = "#3b6cf0"
 _LIT, _DARK, _BACK, _EDGE = (205, 120, 110), (120, 55, 48), (90, 130, 190), (60, 30, 26)
+_NO_PAPER = (255, 255, 255, 0)  # light and dark pages show through
 _LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # of the axes in a drawing of 300 by 150
 
 
@@ -59,7 +60,7 @@ def picture(scene: Scene) -> str:
     side = _SIDE * _OVERSAMPLING
     scale = 0.86 * side / max(float((high - low).max()), 1e-300)
     flat = (seen[:, :2] - (low + high) / 2) * scale + side / 2
-    image = Image.new("RGB", (side, side), _PAPER)
+    image = Image.new("RGBA", (side, side), _NO_PAPER)
     draw = ImageDraw.Draw(image)
     corners = seen[scene.triangles]
     across = normals(corners)

@@ -61,6 +61,6 @@
   }
 
   for (const table of document.querySelectorAll("table")) sortable(table);
-  for (const wide of document.querySelectorAll(".wide")) // what scrolls can be scrolled with the keyboard
+  for (const wide of document.querySelectorAll(".wide, figure, .plot")) // what scrolls can be scrolled with the keyboard
     new ResizeObserver(() => wide.scrollWidth > wide.clientWidth ? wide.setAttribute("tabindex", "0") : wide.removeAttribute("tabindex")).observe(wide);
 })();

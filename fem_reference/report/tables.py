@@ -35,7 +35,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
     forces and inversion numbers that its solver recorded; ``doubts`` the reasons to doubt the reference, in words; ``from_rest``
     the change from rest of every run, with its forces; ``error_bars`` the error bars of the reference and ``rankings`` the solvers
-    that they separate, both empty without bars.
+    that they separate, both empty without bars; ``unsound`` why the frames of a candidate are no answer.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -50,6 +50,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
         "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
         "rankings": ranking.facts(comparison.rankings),
+        "unsound": comparison.unsound,
     }
     return facts | ({"convergence": plain(comparison.ladders)} if comparison.ladders else {})
 

@@ -157,7 +157,7 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
     mesh, fibre = states.read_rest(folder)
     scene = read_muscle(case) if isinstance(case, str | Path) else muscle(case)
     if run.origin.get("scene") != scene.key:
-        raise InputError(folder, f"a run of another scene than {scene.place}", "the scene that was solved")
+        raise InputError(folder, f"a run of a scene other than {scene.place}", "the scene that was solved")
     regions = setup(scene).regions if scene.region else {}
     return Results(mesh, scene.effects, states.StoredStates(folder, run.numbers), fibre, regions)
 

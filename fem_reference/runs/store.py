@@ -201,7 +201,7 @@ def load(folder: Path) -> Run:
     place = folder / "run.json"
     state = texts.read_json(place, "the run.json of a stored run")
     if isinstance(state, dict) and state.get("status") == "running":
-        raise InputError(f"{place}: status", '"running"', "a run that came to its end")
+        raise InputError(f"{place}: status", '"running"', "a finished run")
     stored = parse(Contents, state, f"{place}: run")
     outcome = Outcome(stored.status, stored.message, stored.cost)
     scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}

@@ -100,13 +100,15 @@ class Writer:
     each frame, then ``close``. A frame that is already stored replaces the stored one and all after it.
     """
 
-    def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING) -> None:
-        """Begin a run of an ``identity``: name, solver, origin and requested frames, as in run.json."""
+    def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING, *, anew: bool = False) -> None:
+        """Begin a run of an ``identity``: name, solver, origin and requested frames, as in run.json; always ``anew`` where its
+        solver cannot continue it.
+        """
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
-        if (kept := stored_before(folder, identity)) is not None:
+        if not anew and (kept := stored_before(folder, identity)) is not None:
             self.state = kept | {"name": identity["name"], "origin": identity["origin"]}
             return
         shutil.rmtree(folder) if folder.exists() else None

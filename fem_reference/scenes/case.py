@@ -87,9 +87,9 @@ class NegativeControl(Record):
 
 class Case(Record):
     """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
-    messages, ``from_file`` says that it has one. ``quick`` are changes, by key, with which it is solved faster and less well, as
-    tests do; ``unsolved`` says why the reference ends before the last frame, where it does. ``decisions``, where the case found out
-    itself which effects it needs, say why.
+    messages, ``from_file`` says that it has one. ``quick`` are changes, by key, with which it is solved faster and less accurately,
+    as in tests; ``unsolved`` says why the reference ends before the last frame, where it does. ``decisions`` say why, where the
+    case itself determined which effects it needs.
     """
 
     title: str
@@ -180,8 +180,8 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError where a scene file names a file that is, links followed, in no folder that it may read. A case made
-        by a program may read any file that the program may.
+        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read. A case
+        made by a program may read any file that the program may.
         """
         if not self.from_file:
             return
@@ -230,7 +230,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """True where there is such a file or folder; what is no path at all is none."""
+    """True where there is such a file or folder; False also for text that cannot be a path."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long, or with a null character
@@ -238,7 +238,7 @@ def _exists(path: Path) -> bool:
 
 
 def _unnamed(tables: Any, names: Collection[str]) -> Any:
-    """The ``tables``, of the files that they name the suffix alone, which says how they are read."""
+    """The ``tables`` with only the suffix of each file name, which says how the file is read."""
     if isinstance(tables, dict):
         files = {name for name, text in tables.items() if name in names and isinstance(text, str) and text != DELAUNAY}
         return {name: Path(value).suffix if name in files else _unnamed(value, names) for name, value in tables.items()}

@@ -76,7 +76,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """The keys that there are where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    """The existing keys where ``parts`` of a key lead nowhere, as the end of a sentence."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -217,7 +217,7 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
     """An effect acts once in each region (two of a name would share the unknowns that it brings), a load once on each part of the
-    surface. A bulk modulus below the shear modulus there is of no tissue, and usually a slip of units.
+    surface. A bulk modulus below the shear modulus there belongs to no tissue, and is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
@@ -242,7 +242,7 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
 
 
 def _check_muscles(case: MusclesCase) -> None:
-    """Muscles have a name each, which no bone or attachment has; what acts on all is given for all; each alone is a good case."""
+    """Check that each muscle has its own name, that effects on all muscles are given for all, and that each alone is valid."""
     check_acting(case.effect, [bone.name for bone in case.bone], case.frames, case.place)
     others = [bone.name for bone in case.bone]
     others += [one.name for muscle in case.muscle for one in muscle.attachment]

@@ -1,11 +1,10 @@
-"""Checks of the case of a muscle beyond those of its keys: names are used once and refer to something, and it rests at first."""
+"""Checks of a muscle's case beyond those of its keys: names are unique and refer to something, and it rests at first."""
 
 import numpy as np
 
 from fem_reference.effects import Effect, Ramped, in_situ
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
-from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, check_once, check_used, join
 from fem_reference.scenes import regions
@@ -17,10 +16,6 @@ FREE = "free"
 
 def check_names(case: MuscleCase) -> None:
     """Names are used once and refer to something."""
-    if any(isinstance(effect, MuscleContact) for effect in case.effects):
-        raise InputError(
-            join(case.place, "effect"), '"touching" of a single muscle', "several muscles, or no such effect"
-        )
     bones = [bone.name for bone in case.bone]
     attachments = [attachment.name for attachment in case.attachment]
     check_acting(case.effects, bones, case.frames, case.place)
@@ -36,7 +31,7 @@ def check_names(case: MuscleCase) -> None:
 
 
 def _check_forces(case: MuscleCase) -> None:
-    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
+    """Check that names of forces are distinct and that something keeps the muscle from drifting."""
     bones = [bone.name for bone in case.bone]
     contact = among(case.effects) is not None
     for i, attachment in enumerate(case.attachment):

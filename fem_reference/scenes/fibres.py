@@ -78,11 +78,11 @@ class FibreTurn(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
 
-    ``turned``: the directions of the material are turned from those of these lines, the same everywhere; lengths are those of the
-    lines all the same.
+    ``turned``: the directions of the material are turned from those of these lines, by the same angle everywhere; lengths remain
+    those of the lines.
 
-    ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, go on in the muscle or along its surface
-    to the nearest point of it.
+    ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, are extended in the muscle or along its
+    surface to the nearest point of it.
     """
 
     polylines: PolylineFile | None = None

@@ -26,7 +26,7 @@ Axis = Annotated[Vector, AfterValidator(partial(directed, name="an axis"))]
 
 
 class Keyframe(Record):
-    """The place of a motion at a frame number: at an ``angle`` or at a ``distance``."""
+    """The amount of a motion at a frame number: an ``angle`` or a ``distance``."""
 
     frame: float
     angle: Angle | None = None
@@ -114,7 +114,7 @@ class Rod(Record):
     @classmethod
     def _check_end(cls, end: Vector, info: ValidationInfo) -> Vector:
         if "start" in info.data and not math.dist(info.data["start"], end) > 1e-9:
-            raise ValueError("another point than the start")
+            raise ValueError("a point other than the start")
         return end
 
 
@@ -186,7 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, no fibres."""
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, but no fibres."""
 
     file: str
     unit: LengthUnit
@@ -205,8 +205,8 @@ class Landmarks(Record):
 
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
-    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it go on as
-    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` lets it pull.
+    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it continue as
+    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` makes it pull.
     """
 
     name: Name

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field
 
 from fem_reference.effects import Effect
-from fem_reference.effects.touching import MuscleContact
+from fem_reference.effects.touching import MuscleContact, among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Name, join
 from fem_reference.scenes.case import Case, Expectation
@@ -53,7 +53,7 @@ class MusclesCase(Case):
     @property
     def touching(self) -> MuscleContact | None:
         """The contact between the muscles, None without."""
-        return next((one for one in self.effect if isinstance(one, MuscleContact)), None)
+        return among(self.effect)
 
     @property
     def effects(self) -> tuple[Effect, ...]:

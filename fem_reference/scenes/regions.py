@@ -88,8 +88,8 @@ class CaseRegion(Record):
 
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
-    """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that is not there, or one of
-    the ``regions`` is at another attachment than one of ``attachments``.
+    """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that does not exist, or one
+    of the ``regions`` is at another attachment than one of ``attachments``.
     """
     laws = [
         (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))

@@ -12,7 +12,7 @@ from fem_reference.scenes.case import Case, Standard
 
 
 class Interval(Record):
-    """``count`` nodes from ``start`` to ``end``, both among them; where ``seed`` is given those between are drawn at random."""
+    """``count`` nodes from ``start`` to ``end``, both included; where ``seed`` is given, those between are drawn at random."""
 
     start: float
     end: float
@@ -27,7 +27,7 @@ class Interval(Record):
 
 
 class MeshFiles(Record):
-    """Triangles as listing 4.5 loads them: comma separated files without a head.
+    """Triangles as listing 4.5 loads them: comma separated files without a header.
 
     ``points``: a row of 2 or 3 coordinates a vertex; ``triangles``: a row of three vertices a triangle, the first vertex of all
     being 1, or the word ``delaunay`` for a triangulation of points in the plane.

@@ -103,13 +103,17 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` where a command is given: that of frames, with the settings of the command."""
+    """The contents of ``candidate.toml`` beside a program. Its ``law``, an effect, acts on linear tetrahedra, with a Poisson's
+    ratio of at most its setting ``poisson``, beside the effects that it ``takes``.
+    """
 
     settings: dict[str, Value] = Field(default_factory=dict)
     ladder: dict[str, tuple[Value, ...]] = Field(default_factory=dict)
     files: tuple[str, ...] = ()
     moves: str | None = None
     time_limit: str | None = None
+    law: str | None = None
+    takes: tuple[str, ...] = ()
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
@@ -162,7 +166,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     try:
         words = shlex.split(command)
     except ValueError as error:
-        raise InputError(where, f'"{command}"', f"words as a shell divides them: {error}") from error
+        raise InputError(where, f'"{command}"', f"a command that a shell can parse: {error}") from error
     strange = [word for word in words if set("{}") & set(_PLACEHOLDER.sub("", word))]
     if not words or strange:
         raise InputError(where, f'"{strange[0] if words else ""}"', "a program, with settings such as {iterations}")
@@ -173,7 +177,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     taken = {*CommandSettings.model_fields, *MACHINE_ONLY, "solver", "name", "folder"}  # the last is a file of a scene
     for name in names:
         if name in taken or hasattr(CommandSettings, name):
-            raise InputError(where, f'"{{{name}}}"', "another name of a setting: this one has a meaning here")
+            raise InputError(where, f'"{{{name}}}"', "another name for the setting: this one is reserved")
     return tuple(name for name in names if name not in FOLDERS)
 
 
@@ -241,10 +245,10 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
     missing or damaged.
     """
-    kept, trouble, cost = 0, None, _cost(problem, settings, ended)
+    kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)
-        unit = settings.unit or length_unit(said.unit or "mm")
+        unit, lacks = settings.unit or length_unit(said.unit or "mm"), said.lacks
         for frame in recorded.checked_frames(problem, out, unit):
             sink(frame)
             kept += 1
@@ -252,8 +256,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     except InputError as error:
         trouble = error
     took = f"{ended.seconds:.3g} s, {ended.processor:.3g} s of processor time"
-    last = f" ({ended.said})" if ended.said else ""
-    reached = f"{kept} of {len(problem.frames)} frames are kept"
+    last, reached = f" ({ended.said})" if ended.said else "", f"{kept} of {len(problem.frames)} frames are kept"
     if ended.limit is not None:
         status, why = ended.limit
         return Outcome(status, f"{why}{last}; {reached}", cost)
@@ -264,15 +267,15 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
         failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
         why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
         return Outcome(failed, f"exit status 0, but {why}; {reached}", cost)
-    return Outcome("converged", f"{kept} frames in {took}", cost)
+    return Outcome("converged", f"{kept} frames in {took}{lacks}", cost)
 
 
 def _cost(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended) -> dict[str, float]:
     """The measured cost, with start, reading and writing; unknowns are the coordinates of what it moves."""
     free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
     count = free if settings.moves == "surface" else len(problem.mesh.points)
-    used = {"seconds": ended.seconds, "seconds_solve": ended.seconds, "seconds_processor": ended.processor}
-    return used | {"peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
+    used = {"seconds_processor": ended.processor, "peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
+    return {"seconds": ended.seconds, "seconds_solve": ended.seconds} | used
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:

@@ -29,7 +29,7 @@ from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advanc
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
 SHARE_OF_STABLE = 0.9
-# More steps than this in a frame number are not begun: on 3,000 tetrahedra they take two seconds, and runs have hundreds of them.
+# A run with more steps than this for each frame number is refused: on 3,000 tetrahedra they take two seconds a frame number.
 _MOST_STEPS = 100_000
 # Compiled code is asked for so many steps at once: only in between can the user interrupt.
 _AT_ONCE = 200
@@ -51,8 +51,8 @@ class MassSpringSettings(Record):
 
     ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
     not depend on them, and a small one would make every time step small.
-    ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
-    equilibrium; the scene's interval is that of the reference and of recorded sequences. ``damping``: the
+    ``frame_time``: the solver's own time from a frame number to the next; the longer it is, the nearer the muscle comes to
+    equilibrium. The scene's interval applies to the reference and to recorded sequences. ``damping``: the
     coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
     ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
     ``time_step``: the longest step wanted; without it one that is stable.
@@ -119,7 +119,7 @@ class MassSpringModel:
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
         self.fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *self.attached]))
         skin = boundary(mesh.tets)[0]
-        # What is inside collides with nothing.
+        # Interior masses collide with nothing.
         still = np.union1d(self.fixed, np.setdiff1d(np.arange(len(mesh.points)), skin))
         self.bones = [] if collision is None else colliding_bones(problem.bones, mesh.points, still, collision.gap)
         self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
@@ -164,7 +164,7 @@ class MassSpringModel:
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres as the masses carry them; attached vertices are where the bones have them.
+        """Surface and fibres as the masses carry them; attached vertices move with their bones.
 
         Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, how many are inside
         out.
@@ -200,7 +200,7 @@ def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> O
     what, helps = "", "a longer time_step may help"
     if settings.time_step is None:
         stiffness, damping = model.network.stiffness, model.network.damping
-        what = f"a stiffness of {stiffness:.3g} N/mm and a damping of {damping:.3g} N s/mm want "
+        what = f"a stiffness of {stiffness:.3g} N/mm and a damping of {damping:.3g} N s/mm need "
         helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
     why = f"{what}{model.wanted:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
     return refused(model, problem.frames[0], sink, Trouble("out of steps", why))

@@ -1,9 +1,9 @@
-"""The report's own program, compiled, in the order in which it adds up: folds are opened only, bones are voxels.
+"""The report's own program, compiled, with its order of summation: it only opens folds, and its bones are voxels.
 
 All of it follows the program's source. As the result is chaotic, the last digit counts: each sum here has the order that gcc 12
 gives it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than
-SSE2), as found in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: each other kind is compiled
-for anew.
+SSE2), as found in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: any other kind is compiled
+separately.
 """
 
 import math
@@ -19,11 +19,11 @@ Bools = NDArray[np.bool_]
 
 # Pairs of triangles whose normals have a greater cosine, of either sign, are left alone.
 FLAT_COSINE = 1 - 1e-10
-# A fold is corrected only by so many of its gradients.
+# A fold is corrected only if the ratio of the correction to its gradient is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
 # The squares of the gradients of a fold count as at least this [1/mm2].
 SMALLEST_WEIGHT = 1e-4
-# What the program takes for the diagonal of a voxel, in voxels.
+# The diagonal of a voxel as the program computes it, in voxels.
 DIAGONAL = math.sqrt(3) + 1e-3
 
 
@@ -138,7 +138,7 @@ def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
 def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> None:
     """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], by Mueller 2007.
 
-    With q minus the gradients of the cosine, the points go by ``ratio q``; what asks for too small or too great a ratio stays.
+    With q minus the gradients of the cosine, the points move by ``ratio q``; a fold with too small or too great a ratio stays.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
@@ -238,9 +238,9 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """The places (n, 3) that those reach which are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
+    """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of those that went too far; in voxels.
 
-    They go straight back along their ``displacements`` (n, 3), by steps of 1, until they are outside; too far is farther than
+    They go straight back along their ``displacements`` (n, 3), in steps of 1, until they are outside; too far means farther than
     their length.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)

@@ -1,5 +1,6 @@
 """A sequence of deformed surfaces that another program computed, read from files and checked against the scene."""
 
+import hashlib
 import logging
 import math
 import os
@@ -53,8 +54,9 @@ class RecordedSettings(Record):
 
 
 class About(Record):
-    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, and the time [s] that solving one frame
-    took on so many threads.
+    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
+    on so many threads, and in words what of the scene was ``left_out``. For standings: the ``group`` of its method, the ``case`` of
+    these frames, and a ``sha256`` by name of each file, which is checked.
     """
 
     name: FileName | None = None
@@ -62,6 +64,15 @@ class About(Record):
     unit: str | None = None
     seconds_per_frame: float | None = Field(default=None, gt=0)
     threads: int | None = Field(default=None, gt=0)
+    left_out: tuple[str, ...] = ()
+    group: str | None = None
+    case: Name | None = None
+    sha256: dict[FileName, str] = Field(default_factory=dict)
+
+    @property
+    def lacks(self) -> str:
+        """The end of a sentence with what was left out; empty where nothing was."""
+        return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
     @classmethod
@@ -110,7 +121,7 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
     for frame in frames:
         sink(frame)
     cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
-    message = f"read {len(frames)} frames from {_source(folder)}"
+    message = f"read {len(frames)} frames from {_source(folder)}{said.lacks}"
     return Outcome("converged", message, {key: float(cost[key]) for key in cost})
 
 
@@ -146,6 +157,11 @@ def checked_about(folder: Path, unit: float | None) -> About:
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
         raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {unit:g} mm")
+    for name, wanted in said.sha256.items():
+        file = _about_file(folder).with_name(name)
+        got = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "no file"
+        if got != wanted:
+            raise InputError(f"{_about_file(folder)}: sha256.{name}", f"{got} of the file", wanted)
     return said
 
 

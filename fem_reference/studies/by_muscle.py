@@ -17,7 +17,7 @@ from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
 
 # A remark on the candidates.
-ALONE = "Each candidate solves each muscle by itself: it knows nothing of the other muscles."
+ALONE = "Each candidate solves each muscle by itself, without the other muscles."
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ def calibrate_case(
     ``data``: a CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them;
     ``fit``: keys of numbers that have a range, such as ``"effect[0].mu"``. The result has ``estimates``, each with its
     ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the parameter, and ``holds``: True
-    where the fit converged, the law follows the data, and all numbers are determined.
+    where the fit converged, the law fits the data, and all numbers are determined.
     """
     muscle = casefile.muscle(arguments.check_case(case))
     keys, folder = arguments.check_keys(fit), arguments.free_folder(store, "store")

@@ -213,11 +213,13 @@ class Bench[C: Case]:
         if wanted.offer.fills(wanted.settings):
             origin["mesh"] = self._problem().mesh_facts
         identity = {"name": wanted.name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
-        writer, offer = Writer(wanted.folder, identity, given.rest), wanted.offer
+        offer = wanted.offer
+        keeps = offer.go_on is not None and not (given.body is not None and given.body.rubs)
+        writer = Writer(wanted.folder, identity, given.rest, anew=not keeps)
 
         def solve(sink: Sink) -> Outcome:
             sofar = (given, wanted.settings, sink)
-            return offer.go_on(*sofar, writer.cut_off) if offer.go_on else offer.solve(*sofar)
+            return offer.go_on(*sofar, writer.cut_off) if offer.go_on and keeps else offer.solve(*sofar)
 
         making.write(writer, solve, self._watched(solver))
         return store.load(wanted.folder)

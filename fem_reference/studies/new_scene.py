@@ -63,7 +63,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
-        raise InputError("--bone", f"{len(bones)} files", "two or more: a muscle goes from one to another")
+        raise InputError("--bone", f"{len(bones)} files", "two or more, which the muscle connects")
     names = [path.stem for path in bones]
     if len({*names, "muscle"}) <= len(names):
         raise InputError("--bone", f"the names {', '.join(names)}", "files of different names, none of them muscle")
@@ -116,10 +116,10 @@ def _distinct(name: str, taken: Container[str]) -> str:
 
 def _new(folder: Path) -> Path:
     if not is_name(folder.name):
-        want = "what a scene can be called: at most 100 printable characters, no blanks at the ends"
+        want = "a name of at most 100 printable characters, without blanks at the ends"
         raise InputError("NAME", f'"{folder.name}"', want)
     if folder.exists():
-        raise InputError("NAME", f'"{folder}", which is there already', "the name of a folder that is not there yet")
+        raise InputError("NAME", f'"{folder}", which exists already', "the name of a new folder")
     return folder
 
 

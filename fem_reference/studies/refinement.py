@@ -13,6 +13,7 @@ import numpy as np
 from fem_reference import metrics, solvers
 from fem_reference.assessment import differences, error_bars, force_bars
 from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
+from fem_reference.effects import touching
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Ints
@@ -52,13 +53,14 @@ def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> d
     the error and rounding of distances to bones, unless no bone ``pressed``; load steps, where the ``settings`` have them, with
     drag, viscosity or friction only: else a state does not depend on them.
     """
-    found, contact = dict[str, Vary](), among(case.effects)
-    rubs = contact is not None and contact.friction is not None and pressed
-    if contact is not None and pressed:
-        found["contact stiffness"] = partial(with_contact, stiffness=2 * contact.stiffness)
-        found["contact smoothing"] = partial(with_contact, smoothing=contact.smoothing / 2)
-        if any(bone.surface for bone in case.bone):
-            found["distances to bones"] = lambda one: with_distances(one, 0.5, "distance_error", "distance_rounding")
+    found, bones, itself = dict[str, Vary](), among(case.effects) if pressed else None, touching.among(case.effects)
+    laws = [(name, law) for name, law in (("contact", bones), ("contact with itself", itself)) if law is not None]
+    for name, law in laws:
+        found[f"{name} stiffness"] = partial(with_contact, kind=type(law), stiffness=2 * law.stiffness)
+        found[f"{name} smoothing"] = partial(with_contact, kind=type(law), smoothing=law.smoothing / 2)
+    if bones is not None and any(bone.surface for bone in case.bone):
+        found["distances to bones"] = lambda one: with_distances(one, 0.5, "distance_error", "distance_rounding")
+    rubs = any(law.friction is not None for _, law in laws)
     timed = any("interval" in effect.needs for effect in case.effects)
     if (timed or rubs) and "largest_step" in solvers.trades(type(settings)):
         found["load steps"] = half_steps(case, settings)
@@ -118,7 +120,7 @@ def stored(reference: Run) -> ErrorBars | None:
         return None
     bars = error_bars.load(reference.folder, _of(reference))
     if bars is None and (reference.folder / error_bars.FILE).exists():
-        log.info("%s: made by other metrics; --error-bar makes it anew", reference.folder / error_bars.FILE)
+        log.info("%s: made by other metrics; --error-bar computes it again", reference.folder / error_bars.FILE)
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
@@ -160,7 +162,7 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     coarse = runs[larger]
     if not _tets(coarse) < _tets(reference):
         got = f"meshes of {_tets(reference):.0f} and {_tets(coarse):.0f} tetrahedra"
-        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that coarser meshes differ from")
+        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that a coarser mesh differs from")
     return Pair(
         reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench), springs
     )

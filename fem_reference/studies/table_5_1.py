@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Iterable
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
+from fem_reference.assessment.soundness import unsound
 from fem_reference.effects.contact import among
 from fem_reference.foundations.records import Record
 from fem_reference.metrics import Measure, MeasurementContext, context_of, in_tables, measure
@@ -76,19 +78,22 @@ def _on(
     context = context_of(bench.setup(), reference)
     measures, own = bars.of_deviations if bars else (), needs(scene, scene.reference, context)
     results = [_result(scene, REFERENCE, reference, measures, own)]
-    chosen = _chosen(scene, rows)
-    for i, (kind, candidate, place) in enumerate(chosen):
-        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))
+    those = chosen(scene, rows)
+    for i, (kind, candidate, place) in enumerate(those):
+        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(those))
         run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
         measures = measure(run, reference, context, METRICS)
-        results.append(_result(scene, kind, run, measures, needs(scene, candidate, context)))
+        found = _result(scene, kind, run, measures, needs(scene, candidate, context))
+        results.append(replace(found, unsound=unsound(run, reference)))
     foreign = foreign + [complete(bench.obtain(one.name, one, "--solver-command"), scene.numbers) for one in commands]
-    results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {}) for run in foreign]
+    for run in foreign:
+        found = _result(scene, FOREIGN, run, measure(run, reference, context, METRICS), {})
+        results.append(replace(found, unsound=unsound(run, reference)))
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
 
 
-def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
+def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
     """The solvers measured on a case, row by row: the kind, the candidate, and the place that names it."""
     found = list[tuple[str, Candidate, str]]()
     for row in rows:
@@ -137,11 +142,23 @@ def _leaves(value: object) -> int:
 def _result(
     case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...], needed: dict[str, int]
 ) -> SolverResult:
-    cost = run.outcome.cost
-    # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
-    given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
-    seconds = seconds_per_frame(run) if given is None else given
     named, machine = (kind, run.name, run.solver, case.name), str(run.origin["machine"])
     return SolverResult(
-        *named, run.outcome, seconds, measures, run.numbers, machine, of_reference=kind == REFERENCE, needs=needed
+        *named,
+        run.outcome,
+        seconds_of(run),
+        measures,
+        run.numbers,
+        machine,
+        of_reference=kind == REFERENCE,
+        needs=needed,
     )
+
+
+def seconds_of(run: Run) -> float | None:
+    """The time [s] of a frame number where a solver makes one for each, as its ``candidate.toml`` may say; else of a frame that is
+    wanted; None where it is not known.
+    """
+    cost = run.outcome.cost
+    given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
+    return seconds_per_frame(run) if given is None else given

@@ -10,7 +10,7 @@ import numpy as np
 
 from fem_reference import solvers
 from fem_reference.effects import Effect, make
-from fem_reference.effects.contact import among
+from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.foundations.errors import InputError
@@ -38,10 +38,9 @@ def on_tetrahedra(case: MuscleCase, **changes: float) -> MuscleCase:
     return case.model_copy(update={"muscle": case.muscle.model_copy(update=changes)})
 
 
-def with_contact(case: MuscleCase, **changes: float) -> MuscleCase:
-    """The case with other parameters of its contact."""
-    contact = among(case.effects)
-    effects = (one.model_copy(update=changes) if one is contact else one for one in case.effects)
+def with_contact(case: MuscleCase, kind: type[Effect] = Contact, **changes: float) -> MuscleCase:
+    """The case with other parameters of its contact, of a ``kind``: with bones, or of the muscle with itself."""
+    effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effects)
     return case.model_copy(update={"effect": tuple(effects)})
 
 

@@ -42,13 +42,13 @@ def solve(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
-    """Solve a case, or read its stored run: runs are stored under all that determines them.
+    """Solve a case, or read its stored run: a run is stored under a key of everything that determines it.
 
     ``solver``: the name of one, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
     :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
-    are of the ``solver``, as scene files write them; without any those that the case has for it, or else the page table-5-1. The
+    are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1. The
     run has ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost) and
-    ``folder``. Where physics fails, the status says so and the frames that were reached are there.
+    ``folder``. Where physics fails, the status says so and the frames reached before are kept.
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings)
@@ -72,8 +72,8 @@ def _chosen(
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
     """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in its order.
 
-    ``folder``: one of meshes, one a frame, or a file of a sequence; a ``candidate.toml`` in it may say name and unit. ``unit``:
-    that of length, by default what ``candidate.toml`` says, else mm. InputError where a file cannot be read whole, or its vertices
+    ``folder``: one with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
+    that of length, by default that of ``candidate.toml``, else mm. InputError where a file cannot be read whole, or its vertices
     or its first frame are not those of the case.
     """
     arguments.check_case(case)
@@ -132,7 +132,7 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
     """Write all that another program needs to solve a case into a new or empty ``folder``; the names of the files.
 
     ``form``: ``"open"``, PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too. InputError where
-    ``folder`` is not empty, or FEBio has not the same effects.
+    ``folder`` is not empty, or FEBio lacks an effect.
     """
     arguments.check_case(case)
     muscle = casefile.muscle(case)
@@ -143,7 +143,7 @@ def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
     """Write the runs of a muscle for ParaView into a new or empty ``folder``; the names of the files, or InputError.
 
     ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files says what each array is.
-    Stress, pressure and det F are there if the reference was solved with ``store_state = true``.
+    Stress, pressure and det F are included if the reference was solved with ``store_state = true``.
     """
     arguments.check_comparison(comparison)
     return paraview.write(comparison, arguments.free_folder(folder, "folder"))

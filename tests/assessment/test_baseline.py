@@ -24,11 +24,11 @@ DAMAGE = {
     ),
     "no statistic": (
         lambda path: edited(path, lambda t: t["measures"].update({"mass.sum": t["measures"]["volume.deviation"]})),
-        "measures.mass.sum: got one in .*want a statistic that there is",
+        "measures.mass.sum: got one in .*want an existing statistic",
     ),
     "unit": (
         lambda path: edited(path, lambda t: t["measures"]["volume.deviation"].update(unit="mm")),
-        'measures.volume.deviation: got one in "mm", want a statistic that there is, in %',
+        'measures.volume.deviation: got one in "mm", want an existing statistic, in %',
     ),
     "values": (
         lambda path: edited(path, lambda t: t["measures"]["volume.deviation"]["values"].pop()),

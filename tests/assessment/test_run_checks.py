@@ -221,6 +221,12 @@ def test_a_surface_through_itself(tmp_path) -> None:
     through = np.array(resting(problem).positions)
     through[3, side] -= [12.0, 0.0, 0.0]
     assert lost(problem, replace(resting(problem), positions=through)) == ["the muscle through itself"]
+    # Where it touches itself it may be as deep as the recorded pressure allows: here 10 MPa over 0.1 MPa/mm.
+    touches = replace(problem, effects=(*problem.effects, effects.make("touching", stiffness=0.1, smoothing=0.1)))
+    run = replace(resting(touches), positions=through)
+    for pressure, names in ((0.0, ["the muscle through itself"]), (10.0, []), (np.nan, ["the muscle through itself"])):
+        recorded = run.scalars | {"touching_pressure": np.full(len(run.numbers), pressure)}
+        assert lost(touches, replace(run, scalars=recorded)) == names
 
 
 def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:
@@ -273,3 +279,33 @@ def test_parts_that_touch_overlap_by_the_give_of_contact() -> None:
     assert wrong(0.1, np.nan) == [("low_z1 in high_z0", 0.0)]
     assert wrong(-0.1, 0.0) == []
     assert wrong(0.1, 0.0, replace(body, touching=())) == []
+
+
+def test_an_overlap_at_rest_is_allowed_while_it_is_removed_and_each_law_has_its_own_pressure() -> None:
+    boxes = {
+        name: replace(box, points=box.points + [0, 0, z])
+        for name, z in (("low", 0.0), ("mid", 0.9), ("top", 1.9))
+        for box in [bodies.box((4, 4, 4), (1.0, 1.0, 1.0), "tetrahedron")]
+    }
+    mesh = bodies.joined(boxes)
+    laws = [Touching("low_z1", "mid_z0", 2.0, 0.01, relaxed=(0.0, 2.0)), Touching("mid_z1", "top_z0", 2.0, 0.01)]
+    body, count = Body(mesh, (), (), (0.0, 1.0, 2.0), touching=tuple(laws)), len(mesh.points) // 3
+    upper = (np.arange(len(mesh.points)) >= count)[:, None] * [0, 0, 1.0]
+    highest = (np.arange(len(mesh.points)) >= 2 * count)[:, None] * [0, 0, 1.0]
+
+    def wrong(
+        *lifts: float, deeper: float = 0.0, pressures: tuple[float, float] = (0.0, 0.0)
+    ) -> list[tuple[str, float]]:
+        """What is not met where the upper boxes are lifted so far, and the highest is then ``deeper`` in the one below."""
+        scalars = {"touching_pressure": max(pressures)}
+        scalars |= {law.pressure_name: one for law, one in zip(laws, pressures, strict=True)}
+        frames = [
+            Frame(float(i), points=mesh.points + lift * upper - deeper * highest, scalars=scalars)
+            for i, lift in enumerate(lifts)
+        ]
+        return [(check.name, check.frame) for check in of_body(body, collected(frames, CONVERGED)) if not check.met]
+
+    assert wrong(0.0, 0.05, 0.1) == []  # as removed: 0.1 mm at rest, half of it, none
+    assert wrong(0.0, 0.0, 0.0) == [("low_z1 in mid_z0", 2.0)]
+    assert wrong(0.1, 0.1, 0.1, deeper=0.1, pressures=(0.0, 0.2)) == []
+    assert wrong(0.1, 0.1, 0.1, deeper=0.1, pressures=(0.2, 0.0)) == [("mid_z1 in top_z0", 0.0)]

@@ -29,9 +29,7 @@ def test_without_the_anatomy_moment_arms_are_not_measured(
     tmp_path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("FEM_REFERENCE_DATA", raising=False)
-    monkeypatch.setattr(
-        cube_fits, "collagen_law", partial(cube_fits.collagen_law, 1)
-    )  # test_cube_fits asks how well it fits
+    monkeypatch.setattr(cube_fits, "collagen_law", partial(cube_fits.collagen_law, 1))  # the fit has its own test
     assert cli.main(["page", "credibility", "--out", str(tmp_path), "--quiet"]) == 0
     printed = capsys.readouterr().out
     assert "1 not measured" in printed

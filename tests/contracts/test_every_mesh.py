@@ -71,7 +71,11 @@ def test_file_bounds_a_body(path: Path, entry: dict) -> None:
     assert len(check_closed(read_surface(path, 1.0)).triangles) == entry["triangles"]
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+@pytest.mark.parametrize(
+    "folder",  # that of the figure takes longest
+    [pytest.param(one, marks=pytest.mark.nightly if one.name == "figure" else ()) for one in FOLDERS],
+    ids=lambda folder: folder.name,
+)
 def test_build_script_makes_the_same_bodies(folder: Path) -> None:
     made = runpy.run_path(str(folder / "build.py"))["build"]()
     surfaces = [entry for entry in CARDS[folder] if entry["name"].endswith(".ply")]

@@ -68,6 +68,11 @@ def collagen(l: float) -> float:  # noqa: E741
     return 2 * 0.02 / 2 * (square - 1) * np.exp(1.5 * (square - 1) ** 2) * rate if square > 1 else 0.0
 
 
+def st_venant(l: float) -> float:  # noqa: E741
+    along, across = (l**2 - 1) / 2, (1 / l - 1) / 2
+    return 2 * 0.01 * (along * l - across / l**2) + 0.09 * (along + 2 * across) * (l - 1 / l**2)
+
+
 LAWS: dict[str, Callable[[float], float]] = {
     "neo_hooke": lambda s: 0.01 * (s - s**-2),
     "mooney_rivlin": lambda s: 2 * (s - s**-2) * (0.01 + 0.004 / s),
@@ -78,6 +83,8 @@ LAWS: dict[str, Callable[[float], float]] = {
     "holzapfel_ogden": holzapfel,
     "guccione": guccione,
     "collagen_across": collagen,
+    "st_venant_kirchhoff": st_venant,
+    "stable_neo_hooke": lambda s: 0.01 * (s - s**-2),
 }
 STRETCHES = (0.3, 0.5, 0.7, 0.9, 1.05, 1.2, 1.37, 1.5, 1.6, 1.7, 1.8)
 

@@ -12,6 +12,7 @@ from fem_reference.studies.execution import Bench
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_unrelated_meshes_of_one_size_differ_by_less_than_two_sizes(data, tmp_path) -> None:
     # The report's own ragged attachments, by springs. Sizes that differ by 4 % give other points and tets everywhere.
     assert data.is_dir()

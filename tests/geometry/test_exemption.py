@@ -122,7 +122,7 @@ def test_nothing_attached_and_nothing_but(caplog) -> None:
     whole = exemption(surface, np.arange(len(surface.points)))
     assert whole.lost == 1
     assert len(free_skin(whole, mesh, 1.0).points) == 0
-    with pytest.raises(InputError, match=r"case\.toml: attachment: got .* of 100 % of what is not attached"):
+    with pytest.raises(InputError, match=r"case\.toml: attachment: got .* of 100 % of the unattached surface"):
         check_exempt(whole, "case.toml: attachment")
     assert not caplog.text
 
@@ -144,4 +144,4 @@ def test_much_that_is_exempt_is_warned_of(caplog) -> None:
                 check_exempt(exempt, "attachment")
         else:
             check_exempt(exempt, "attachment")
-            assert "of what is not attached, where no contact is felt" in caplog.text
+            assert "of the unattached surface, without contact there" in caplog.text

@@ -52,6 +52,7 @@ def test_it_is_legible_and_silent_at_a_desk_and_on_a_phone(browser, written, kin
         browser.screen(width, scheme=scheme)
         assert browser.ask("document.documentElement.scrollWidth") <= width, browser.ask("checks.wide()")
         assert browser.ask("checks.pale()") == []
+        browser.wait("!checks.unsaid().length")
         assert browser.complaints() == []
         assert [address for address in browser.requests() if not address.startswith(("data:", "blob:"))] == [
             written[kind].resolve().as_uri()
@@ -70,6 +71,23 @@ def test_printed_it_is_light_whole_and_without_controls(browser, written, kind) 
     printed = base64.b64decode(browser.call("Page.printToPDF", printBackground=False, preferCSSPageSize=True)["data"])
     assert printed.startswith(b"%PDF-")
     assert browser.complaints() == []
+
+
+def lightness(colour: str) -> float:
+    """The relative luminance of ``#rrggbb`` by WCAG 2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return float(np.dot((0.2126, 0.7152, 0.0722), linear))
+
+
+@pytest.mark.parametrize("kind", every_page.KINDS)
+def test_what_a_drawing_draws_is_seen_on_dark_paper(written, kind) -> None:
+    """A colour has another on dark paper, or stands out from it by 3 to 1."""
+    text = written[kind].read_text(encoding="utf-8")
+    root = re.findall(r":root \{(.*?)\}", text, re.DOTALL)[1]
+    dark = dict(re.findall(r"--([\w-]+): (#\w{6})\b", root))
+    for name, colour in set(re.findall(r"var\(--([\w-]+), (#\w{6})\)", text)):
+        assert name in dark or (lightness(colour) + 0.05) / (lightness(dark["paper"]) + 0.05) > 3, (name, colour)
 
 
 def shade(browser: Browser, element: str) -> float:

@@ -40,5 +40,7 @@ def test_a_coefficient_that_is_none_is_refused() -> None:
     for wrong in (0.0, -0.1, float("nan"), float("inf")):
         with pytest.raises(InputError, match=f"friction: got {wrong}, want a number above 0, or None"):
             check([0.3, wrong], begun=False)
-    with pytest.raises(InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest"):
+    with pytest.raises(
+        InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest, without tension"
+    ):
         check([0.3], begun=True)

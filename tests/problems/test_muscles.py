@@ -88,6 +88,18 @@ def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
     assert rest.mesh.points[rest.mesh.tets[b.cells]].reshape(-1, 3)[:, 0].min() == 15
 
 
+def test_friction_between_muscles_is_that_of_the_parts_that_touch(folder: Path) -> None:
+    rough = text(slide=3).replace('smoothing = "0.1 mm"\n', 'smoothing = "0.1 mm"\nfriction = 0.2\n')
+    (folder / "case.toml").write_text(rough)
+    case = casefile.read(folder)
+    body = of_case.problem(case, of_case.setup(case)).body
+    assert [(law.friction, law.relaxed) for law in body.touching] == [(0.2, None)]
+    assert body.rubs
+    (folder / "case.toml").write_text(rough.replace("0.2", "0.0"))
+    with pytest.raises(InputError, match=r"friction: got 0\.0"):
+        casefile.read(folder)
+
+
 def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) -> None:
     bench = Bench(case_of(folder), tmp_path / "runs")
     with pytest.raises(InputError, match=r'"arap_pbd" for several muscles, want the reference'):

@@ -7,6 +7,7 @@ import pytest
 
 import fem_reference as fr
 from fem_reference.problems.checks import check
+from fem_reference.problems.touching import with_itself
 
 LAW = fr.Touching("low_z1", "high_z0", 2.0, 0.1)
 
@@ -30,6 +31,7 @@ def test_the_pressure_is_that_of_bones() -> None:
         (replace(LAW, stiffness=0.0), r"touching\[1\].stiffness: got 0.0, want a number above 0"),
         (replace(LAW, smoothing=float("nan")), r"touching\[1\].smoothing: got nan"),
         (replace(LAW, other="low_z0"), r'touching\[1\]: got "low_z1" and "low_z0" on one connected piece'),
+        (replace(LAW, one="high_z0", other="low_z1", friction=0.0), r"friction: got 0\.0, want a number above 0"),
         (replace(LAW, one="low"), r'on: got "low", want a region of the body'),
         ("low_z1", r"touching\[1\]: got str .*, want Touching records"),
     ],
@@ -38,3 +40,12 @@ def test_what_is_wrong_is_refused(law, message) -> None:
     check(body(LAW), "P1")
     with pytest.raises(fr.InputError, match=message):
         check(body(LAW, law), "P1")
+
+
+def test_a_part_with_itself_feels_no_pressure_at_rest() -> None:
+    itself = replace(LAW, other="low_z1")
+    check(body(itself), "P1")
+    assert [one.allowance(0.5) for one in (LAW, itself, replace(itself, relaxed=(0.0, 1.0)))] == [0.0, 1.0, 0.5]
+    effect = fr.make_effect("touching", stiffness=2.0, smoothing=0.1, friction=0.2)
+    assert with_itself((effect,), "free") == (fr.Touching("free", "free", 2.0, 0.1, 0.2),)
+    assert with_itself((), "free") == ()

@@ -33,7 +33,7 @@ def test_what_does_not_count_is_said() -> None:
     assert "at the high end of its range, 0.02 MPa, so that neither it nor its interval counts" in text(
         found(1.0, bound)
     )
-    assert ": the law does not follow the data" in text(found(3.0, wide))
+    assert ": the law does not fit the data" in text(found(3.0, wide))
     assert ": the data scatter less than they say" in text(found(0.1, wide))
 
 

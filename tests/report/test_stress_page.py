@@ -49,6 +49,14 @@ def test_what_spans_decades_has_a_logarithmic_axis() -> None:
     assert found["limit"] == pytest.approx(8 + 112 * (1 - np.log(30) / np.log(3e7)))
 
 
+def test_paper_shows_through_beside_a_body_in_light_and_dark() -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1.0]])
+    source = stress_page.picture(Scene(corners, np.array([[0, 1, 2]]), None))
+    opaque = np.asarray(Image.open(io.BytesIO(base64.b64decode(source.split(",")[1]))).convert("RGBA"))[:, :, 3]
+    assert opaque[0, 0] == 0
+    assert 0.1 < np.mean(opaque == 255) < 0.5  # half of a square that the picture leaves a margin around
+
+
 def test_the_inner_side_of_a_body_is_blue_and_its_outer_side_is_not() -> None:
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1.0]])  # the camera looks along +y
     for triangle, inner in (([0, 1, 2], False), ([0, 2, 1], True)):

@@ -46,6 +46,7 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "verdicts",
         "error_bars",
         "rankings",
+        "unsound",
     ]
     assert list(printed) == keys
     assert printed["error_bars"] == []

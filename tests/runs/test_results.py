@@ -307,7 +307,7 @@ def test_a_run_without_states_another_scene_or_a_damaged_file_is_named(tmp_path)
         results.of_run(tmp_path / "bare", "hip_flexion")
     stored(tmp_path / "run", moved(affine(F)), None)
     assert states.read_rest(tmp_path / "run")[1] is None
-    with pytest.raises(InputError, match=r"a run of another scene than .*hip_flexion"):
+    with pytest.raises(InputError, match=r"a run of a scene other than .*hip_flexion"):
         results.of_run(tmp_path / "run", "hip_flexion")
     (tmp_path / "run" / "state" / "frame_0000.npz").write_bytes(b"PK\x03\x04 half")
     with pytest.raises(InputError, match=r"frame_0000.npz: .* want the arrays displacement, pressure, before, rate"):

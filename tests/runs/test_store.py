@@ -29,7 +29,7 @@ def test_what_is_written_reads_back(tmp_path) -> None:
 
 def test_a_run_that_was_cut_off_is_no_result(tmp_path) -> None:
     folder = write(tmp_path / "run", close=False)
-    with pytest.raises(InputError, match='status: got "running", want a run that came to its end'):
+    with pytest.raises(InputError, match='status: got "running", want a finished run'):
         store.load(folder)
     assert store.finished(folder) is None
 

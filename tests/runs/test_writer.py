@@ -105,7 +105,8 @@ def test_a_writer_goes_on_where_a_run_was_cut_off(status: str | None, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "change", ["converged", "diverged", "no folder", "other frames", "other solver", "other versions", "damaged"]
+    "change",
+    ["converged", "diverged", "no folder", "other frames", "other solver", "other versions", "damaged", "anew"],
 )
 def test_a_run_that_cannot_go_on_begins_anew(change: str, tmp_path: Path) -> None:
     identity = dict(CUT_OFF)
@@ -120,7 +121,7 @@ def test_a_run_that_cannot_go_on_begins_anew(change: str, tmp_path: Path) -> Non
         others = {"frames": (0, 5), "solver": "another", "versions": {"versions": {"numpy": "3"}}}
         key = change.removeprefix("other ")
         identity[{"versions": "origin"}.get(key, key)] = others[key]
-    assert Writer(tmp_path / "run", identity, AtRest(SURFACE)).frames == ()
+    assert Writer(tmp_path / "run", identity, AtRest(SURFACE), anew=change == "anew").frames == ()
     assert not (tmp_path / "run" / "surface").exists()
 
 

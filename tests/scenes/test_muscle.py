@@ -197,7 +197,7 @@ WRONG_BONES = [
     (
         "bone[0]",
         {"name": "wall", "cylinder": ROD | {"end": "0, 0, 0 mm"}},
-        'bone[0].cylinder.end: got "0, 0, 0 mm", want another point than the start',
+        'bone[0].cylinder.end: got "0, 0, 0 mm", want a point other than the start',
     ),
 ]
 

@@ -89,7 +89,6 @@ def test_the_key_changes_with_each_muscle_and_not_with_what_is_expected(bar: Pat
             r"muscle\[1\]\.tet_sise: got an unknown key",
         ),
         (several(nested("a"), nested("b")) + EXPECTED, r"expect: got expectations of all muscles"),
-        (SCENE + TOUCHING, r'effect: got "touching" of a single muscle'),
         (several(nested("a")) + ATTACHED, r"attachment: got it, and muscle\[0\]\.attachment"),
     ],
 )

@@ -199,16 +199,19 @@ def test_a_program_that_only_waits_says_nothing_of_what_was_solved(bar, tmp_path
         ("mine {scene} {out} {n", 'command: got "{n", want a program, with settings such as'),
         ("mine {scene} {out} {n:03d}", "want a program, with settings such as"),
         ("mine {scene} {}", "want a program, with settings such as"),
-        ("mine {scene} 'unclosed", "words as a shell divides them: No closing quotation"),
+        ("mine {scene} 'unclosed", "a command that a shell can parse: No closing quotation"),
         ("mine {out}", "want {scene} in it"),
         ("mine {scene}", "want {out} in it"),
         ("", "a program, with settings"),
         ("mine {scene} {out} {count}", "count: got nothing, want this key"),
-        ("mine {scene} {out} {unit}", 'command: got "{unit}", want another name of a setting'),
-        ("mine {scene} {out} {copy}", 'command: got "{copy}", want another name of a setting'),
-        ("mine {scene} {out} {precision}", 'command: got "{precision}", want another name of a setting'),  # in no key
-        ("mine {scene} {out} {ranks}", 'command: got "{ranks}", want another name of a setting'),
-        ("mine {scene} {out} {folder}", 'command: got "{folder}", want another name of a setting'),  # of a scene
+        ("mine {scene} {out} {unit}", 'command: got "{unit}", want another name for the setting'),
+        ("mine {scene} {out} {copy}", 'command: got "{copy}", want another name for the setting'),
+        (
+            "mine {scene} {out} {precision}",
+            'command: got "{precision}", want another name for the setting',
+        ),  # in no key
+        ("mine {scene} {out} {ranks}", 'command: got "{ranks}", want another name for the setting'),
+        ("mine {scene} {out} {folder}", 'command: got "{folder}", want another name for the setting'),  # of a scene
     ],
 )
 def test_a_command_that_cannot_be_filled_in_is_refused(text, problem) -> None:

@@ -228,8 +228,8 @@ def test_single_tetrahedra_inside_out_are_reported() -> None:
     ("change", "message"),
     [
         ({"time_step": "1e-12 s"}, "2e+10 steps in a frame number, at most 100000; a longer time_step may help"),
-        ({"damping": "1e9 N s/m"}, "a stiffness of 1 N/mm and a damping of 1e+06 N s/mm want "),
-        ({"stiffness": "1e9 N/mm"}, "a stiffness of 1e+09 N/mm and a damping of 2e-05 N s/mm want "),
+        ({"damping": "1e9 N s/m"}, "a stiffness of 1 N/mm and a damping of 1e+06 N s/mm need "),
+        ({"stiffness": "1e9 N/mm"}, "a stiffness of 1e+09 N/mm and a damping of 2e-05 N s/mm need "),
     ],
 )
 def test_too_many_steps_are_not_begun(change, message) -> None:

@@ -223,9 +223,11 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings with open ones filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
-    if isinstance(problem, MusclesProblem):
+    if isinstance(problem, MusclesProblem) or problem.body.touching:
         if (settings.ranks or 1) > 1:
-            raise InputError("ranks", settings.ranks, "1, on which several muscles are solved")
+            raise InputError(
+                "ranks", settings.ranks, "1, on which several muscles, or one that touches itself, are solved"
+            )
         if settings.linear_solver == "multigrid":
             raise InputError("linear_solver", '"multigrid"', "another: its levels know no muscles that touch")
         settings = settings.model_copy(update={"ranks": 1})

@@ -137,7 +137,7 @@ class AssembledBody:
         halfway state is solved where work and energy disagree.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
-        looked = list[bool]()
+        looked, restoring = list[bool](), [one.restoring() for one in self.contacts]
 
         def halfway() -> bool:
             looked.append(True)
@@ -151,8 +151,8 @@ class AssembledBody:
         if looked:
             self.set_frame(frame)
             self.system.contact = contact
-            if self.contact:
-                self.contact.update(frame)
+            for restore in restoring:
+                restore()
         for one in self.contacts:
             one.settle()
         self.clock.settle(frame, after)
@@ -161,8 +161,8 @@ class AssembledBody:
     def go_back(self, before: Floats) -> None:
         """Restore the last good state, whose unknowns are ``before``."""
         self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.go_back()
+        for one in self.contacts:
+            one.go_back()
 
     def _begin(self, before: Floats) -> None:
         """Find the initial acceleration of the body at its rest ``before``: by a step in which nothing moves."""

@@ -4,7 +4,7 @@ Distances are computed only for points that may be near a bone (``broad_phase``)
 load step that begins and ends without contact pressure is solved without contact.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,6 +15,7 @@ from mpi4py import MPI
 from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Sampled
+from fem_reference.geometry.signed_distance import FAR
 from fem_reference.problems.contact import ContactBone, ContactLaw, nearest_on_path
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
@@ -47,6 +48,7 @@ class Pressed:
 
 # Tractions (n, 3) [MPa] at points (n,), which may repeat.
 Tractions = tuple[Ints, Floats]
+State = tuple[list[Pressed], float, Floats]
 
 
 class ContactForces:
@@ -74,9 +76,6 @@ class ContactForces:
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
             self.update(frame)
         self.settle()
-        if law.friction is not None:
-            self.friction = [Friction(law, self._held(i)) for i in range(len(bones))]
-            self.settle()
 
     def look(self) -> None:
         """Look for points as far from each bone as it is felt with the overlaps at rest, or supports them there."""
@@ -200,7 +199,7 @@ class ContactForces:
             "contact_points": float(touched.sum()),
             "contact_points_near": float(sum(len(one.near) for one in self.now)),
         }
-        sums |= {"friction_work": self.dissipated} if self.friction else {}
+        sums |= {"friction_work": self.dissipated} if self.law.friction else {}
         found = {name: comm.allreduce(value, MPI.MAX) for name, value in greatest.items()}
         return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
@@ -214,27 +213,39 @@ class ContactForces:
         return self._worst(mine) or "nowhere"
 
     def settle(self) -> None:
-        """Take the present state as the start of the next step."""
+        """Take the present state as the start of the next step. Friction begins once no overlap at rest is left."""
         for friction, one in zip(self.friction, self.now, strict=False):
             if one.grip is not None:
                 friction.settle(one.grip)
                 self.dissipated += float(self.points.areas[one.pressed] @ one.grip.lost)
-        self.settled = self.now, self.frame, self.moved
+        if self.law.friction and not self.friction and self.law.allowance(self.frame) == 0:
+            self.friction = [Friction(self.law, self._held(i)) for i in range(len(self.bones))]
         if self.friction:
             self.update(self.frame)
-            self.settled = self.now, self.frame, self.moved
+        self.settled = self.state
         for nearby in self.nearby:
             nearby.met[:] = False
 
-    def go_back(self) -> None:
-        """Restore the settled state, as the unknowns have been."""
-        self.now, self.frame, self.moved = self.settled
+    @property
+    def state(self) -> State:
+        """The contact with each bone, its frame, and what the nodes that carry points have been moved by."""
+        return self.now, self.frame, self.moved
+
+    def restoring(self) -> Callable[[], None]:
+        """A function that restores the present state, as the unknowns have been."""
+        return partial(self.go_back, self.state)
+
+    def go_back(self, state: State | None = None) -> None:
+        """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        self.now, self.frame, self.moved = state or self.settled
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where a point went through a bone since the last settled state, or is pressed near the middle of one."""
+        """Diverged where a point went through a bone since the last settled state, is pressed near the middle of one, or met one
+        with friction from afar.
+        """
         with self.spent.on("contact"):
             through = [one for i in range(len(self.bones)) if (one := self._through(i))]
-            why = self._worst(through) or self._worst(self._yielded())
+            why = self._worst(through) or self._worst(self._yielded()) or self._worst(self._from_afar())
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
@@ -245,6 +256,17 @@ class ContactForces:
             half = entry.shape.half_thickness
             said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
+        return mine
+
+    def _from_afar(self) -> list[tuple[float, str]]:
+        """The bones with friction that a point met in one step from where no distance is known: it slips from nowhere."""
+        mine = list[tuple[float, str]]()
+        for i, friction in enumerate(self.friction):
+            pressed = self.now[i].pressed
+            new = pressed[np.isnan(friction.stuck[pressed, 0])]
+            count = int((self._before(i, new)[1] >= FAR).sum())
+            said = f'{count} points met "{self.bones[i].name}", with friction, from too far away within a load step'
+            mine += [(float(count), said)] if count else []
         return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:

@@ -30,9 +30,11 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """The states to continue from; all other files that an earlier process left in the folder are removed."""
+    """The states to continue from; all other files that an earlier process left in the folder are removed. With friction there are
+    none, as the places that hold points are not kept.
+    """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
-    frames = tuple(number for number in cut_off.numbers if _is_of(whole, number))
+    frames = tuple(number for number in cut_off.numbers if not body.rubs and _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)
     for path in cut_off.folder.iterdir():
         if path not in {whole.place(number) for number in frames}:
@@ -51,10 +53,17 @@ def _is_of(whole: Kept, number: int) -> bool:
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose
     positions are requested. Only a muscle has them, and then forces at edges shared by attachments are divided between these.
-    ``kept``: the states that are kept, if any.
+    ``kept``: the states that are kept, if any. InputError where stable states are to be followed with friction, under which none
+    is known to be.
     """
 
     body: Body
     settings: BodySettings
     samples: dict[str, tuple[Ints, Floats]] = field(default_factory=dict)
     kept: Kept | None = None
+
+    def __post_init__(self) -> None:
+        if self.body.rubs and self.settings.follow == "stable":
+            raise InputError(
+                "follow", '"stable" with friction', '"equilibrium", as its unstable states are not counted'
+            )

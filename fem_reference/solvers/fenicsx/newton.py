@@ -52,6 +52,8 @@ class Newton:
                 return found
         system.unknowns.x.array[:], system.contact = before, contact
         contact.go_back()
+        if system.touching:
+            system.touching.go_back()
         self.thrown += found.iterations
         return self.solve(frame)
 
@@ -66,7 +68,7 @@ class Newton:
             try:
                 self.linear.solve(self.system.b, self.step, self._tolerance(scaled, last))
             except LinearSolveError as error:
-                why = f"met a tangent that cannot be solved with ({error}) in iteration {len(residuals)}"
+                why = f"met a linear system that cannot be solved ({error}) in iteration {len(residuals)}"
                 return self._failed(residuals, why)
             smallest, last = self._take(smallest), scaled
             if not self.determinants.everywhere(smallest > 0):

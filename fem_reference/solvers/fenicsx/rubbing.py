@@ -84,8 +84,11 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Slid
 
 class Rubbing:
     """Friction of the points of one pass by its law. ``facets`` (n,) and ``at`` (n, 2): the places on the other side that hold the
-    points, facet -1 where none does; ``settled`` (u,): the unknowns since when slip is counted.
+    points, facet -1 where none does; ``settled`` (u,): the unknowns since when slip is counted. It ``acts`` once nothing is left
+    of an overlap at rest.
     """
+
+    acts = False
 
     def __init__(self, one: Pass, count: int) -> None:
         self.one, self.law, self.other = one, one.law, one.other
@@ -93,6 +96,7 @@ class Rubbing:
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
         """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) there, and no others."""
+        self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
@@ -167,7 +171,8 @@ class Rubbing:
         none, count = np.zeros((len(own), 6, own.shape[1])), len(own)
         by = np.concatenate([none, others], axis=2)
         by[:, 0] = np.concatenate([own, -others[:, 0]], axis=1)
-        vectors = (by[:, :3, None, :, None] * np.eye(3)[:, None]).reshape(count, 9, -1)
-        along = (by[:, 3:, :, None] * met.there.normal[:, None, None]).reshape(count, 3, -1)
-        dofs = np.concatenate([self.one.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, -1)
+        width = 3 * by.shape[2]
+        vectors = (by[:, :3, None, :, None] * np.eye(3)[:, None]).reshape(count, 9, width)
+        along = (by[:, 3:, :, None] * met.there.normal[:, None, None]).reshape(count, 3, width)
+        dofs = np.concatenate([self.one.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, width)
         return dofs, np.concatenate([vectors, along], axis=1)

@@ -42,7 +42,7 @@ class Session:
         if body.touching and self.ranks > 1:
             raise InputError("ranks", self.ranks, "1, on which parts of the surface may touch")
         if body.touching and settings.linear_solver == "multigrid":
-            raise InputError("linear_solver", '"multigrid"', "another, as its levels know no parts that touch")
+            raise InputError("linear_solver", '"multigrid"', "another: its levels do not support touching parts")
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:

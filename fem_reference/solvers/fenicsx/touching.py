@@ -4,6 +4,9 @@ Points of quadrature on either side meet the nearest place on the facets of the 
 both sides are alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from scipy.sparse import csr_array
 
@@ -20,6 +23,8 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
+# The unknowns (n,) of a search, what each pass met, and its friction.
+State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None]]
 
 
 class TouchingForces:
@@ -31,13 +36,18 @@ class TouchingForces:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
         self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
         for law in body.touching:
-            low, high = (facets_of(displacement, body.mesh, form.regions[name]) for name in (law.one, law.other))
-            self.passes += [Pass(law, low, high, law.forces), Pass(law, high, low, law.forces[::-1])]
+            names = dict.fromkeys((law.one, law.other))
+            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
+            low, high = parts[law.one], parts[law.other]
+            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
+            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
         self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
         self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
+        self.settled: State = np.array(self.unknowns.x.array), [], []
+        self.move_to(body.frames[0])
         self.settle()
         depths = [
             (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
@@ -51,16 +61,17 @@ class TouchingForces:
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
-            if one.law.relaxed:
+            if one.law.relaxed or one.own:
                 one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
-        self.move_to(body.frames[0])
+        self.seen = np.full_like(self.seen, np.nan)
+        self.settle()
 
     def move_to(self, frame: float) -> None:
         """Subtract what is left at ``frame`` of overlaps at rest."""
         for one in self.passes:
             if (share := one.law.allowance(frame)) != one.share:
                 one.share = share
-                self.seen[:] = np.nan
+                self.seen = np.full_like(self.seen, np.nan)
 
     def acting(self) -> list[float]:
         """The shares of overlaps at rest that are subtracted."""
@@ -68,7 +79,7 @@ class TouchingForces:
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
         """The skin around the other part, by pass, that its points may not touch; None where there is none."""
-        pairs = [pair for law in body.touching for pair in ((law.one, law.other), (law.other, law.one))]
+        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
         around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
         return [
             Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
@@ -80,13 +91,14 @@ class TouchingForces:
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
-                lasts = [*(met for met, _ in self.now), *(None for _ in self.passes if not self.now)]
-                mets = [
-                    one.met(self.seen, one.law.smoothing, last) for one, last in zip(self.passes, lasts, strict=True)
-                ]
+                none = [None] * len(self.passes)
+                lasts, thens = ([met for met, _ in state] or none for state in (self.now, self.settled[1]))
+                columns = zip(self.passes, lasts, thens, strict=True)
+                before = self.settled[0]
+                mets = [one.met(self.seen, one.law.smoothing, last, (before, then)) for one, last, then in columns]
                 self.now = [(met, one.pressed(met)) for one, met in zip(self.passes, mets, strict=True)]
                 pairs = zip(self.rubbing, mets, strict=True)
-                self.rubbed = [one.rubbed(met, self.seen) if one else None for one, met in pairs]
+                self.rubbed = [one.rubbed(met, self.seen) if one and one.acts else None for one, met in pairs]
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
@@ -120,6 +132,8 @@ class TouchingForces:
         self.look()
         found = dict[str, tuple[Floats, Floats]]()
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
+            if one.own is not None:  # of a part on itself: none in all
+                continue
             forces = contact.forces[:, None] * met.there.normal  # on the points
             for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
@@ -132,7 +146,8 @@ class TouchingForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point; the rest area under pressure,
+        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, of several laws each its own pressure
+        too (``Touching.pressure_name``); the rest area under pressure,
         ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
         deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
         the start, ``touching_friction_work`` [N mm].
@@ -143,9 +158,14 @@ class TouchingForces:
         gaps = np.concatenate([met.gap for met, _ in self.now])
         more = {"touching_overlap_at_rest": self.overlap} if removed else {}
         more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
+        most = dict[str, float]()
+        for one, (met, _) in pairs:
+            name = one.law.pressure_name
+            most[name] = max(most.get(name, 0.0), float(one.pressure(met)[0].max(initial=0.0)))
+        more |= most if len(most) > 1 else {}
         return {
             "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
-            "touching_pressure": max(float(one.pressure(met)[0].max(initial=0.0)) for one, (met, _) in pairs),
+            "touching_pressure": max(most.values()),
             "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
             "touching_points": float(len(gaps)),
         } | more
@@ -153,20 +173,34 @@ class TouchingForces:
     def settle(self) -> None:
         """Take the present state as the start of the next step."""
         self.look()
-        self.settled = [met for met, _ in self.now]
-        for one, met, rubbed in zip(self.rubbing, self.settled, self.rubbed, strict=True):
-            if one and rubbed:
-                one.settle(met, rubbed.held, self.seen)
-                self.dissipated += float(rubbed.lost.sum())
+        for one, (met, _), rubbed in zip(self.rubbing, self.now, self.rubbed, strict=True):
+            if one:
+                one.settle(met, rubbed.held if rubbed else met.there.at, self.seen)
+                self.dissipated += float(rubbed.lost.sum()) if rubbed else 0.0
         if any(self.rubbing):
-            self.seen = np.full(len(self.seen), np.nan)  # what holds the points is another
+            self.seen = np.full_like(self.seen, np.nan)  # what holds the points is another
+            self.look()
+        self.settled = self.state
+
+    @property
+    def state(self) -> State:
+        """The contact at the unknowns of the last search, which determines the facets that points stay on in the next."""
+        return self.seen, self.now, self.rubbed
+
+    def restoring(self) -> Callable[[], None]:
+        """A function that restores the present state, as the unknowns have been."""
+        return partial(self.go_back, self.state)
+
+    def go_back(self, state: State | None = None) -> None:
+        """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        self.seen, self.now, self.rubbed = state or self.settled
 
     def trouble(self, before: Floats, /) -> Trouble | None:
         """Diverged where a point went through the other part since the unknowns ``before`` (n,), past its rim or too far."""
         self.look()
-        columns = self.passes, self.rims, self.settled, self.now, self.rubbed
-        for one, rim, last, (met, _), rubbed in zip(*columns, strict=True):
-            lost, how = one.through(before, self.seen, met), "went through the other side"
+        columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
+        for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
+            lost, how = one.through(before, last, self.seen, met), "went through the other side"
             if rim and not len(lost):
                 lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
             if rubbed and not len(lost):

@@ -9,6 +9,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.passing import passed, seen_along
 from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
+from fem_reference.solvers.fenicsx.own_pairs import OwnPairs
 
 # Of the quadrature on facets: with 5 instead of 8 the pressure between two blocks with unrelated meshes is off by 5 instead of 2 %.
 _DEGREE = 8
@@ -20,6 +21,8 @@ _BEYOND = 0.02
 _STAYS = 0.05
 # Beyond a sharp edge a part faces another way: a point that slides off it there is free.
 _FACING = -0.5
+# Of a part with itself, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
+_DEEP = 0.125
 _BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
 
 
@@ -55,6 +58,10 @@ class PressedPoints:
     second: Floats
 
 
+# The unknowns (n,) of a settled state, and what was met in it, if anything.
+Settled = tuple[Floats, Met | None]
+
+
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
     ``names``: those of the force on the side and of the one on the other.
@@ -76,9 +83,12 @@ class Pass:
         )  # at rest, and the share of them that is subtracted now
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
-        # Below half the thickness of a part its other side is nearer.
+        self.own = OwnPairs(side) if side is other else None
+        # Below half the thickness of a part its other side is nearer. Parts of one that overlap at rest are not that.
+        inset = law.smoothing if self.own else 0.0
         triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
-        self.deepest = seen_along(middle.point, -middle.normal, triangles) / 2
+        starts = middle.point - inset * middle.normal
+        self.deepest = (seen_along(starts, -middle.normal, triangles) + inset) / 2
 
     def _here(self, nodes: Floats, points: Ints) -> FacetPlaces:
         """The places of ``points`` (n,) on their own facets."""
@@ -88,14 +98,17 @@ class Pass:
         """The present positions (n, 3) [mm] of the points."""
         return np.asarray((self.basis @ self.side.nodes(unknowns)).reshape(-1, 3))
 
-    def met(self, unknowns: Floats, most: float, last: Met | None = None) -> Met:
+    def met(self, unknowns: Floats, most: float, last: Met | None = None, settled: Settled | None = None) -> Met:
         """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
-        reaches as deep as its radius, and as half the thickness of its part.
+        reaches as deep as its radius, and as half the thickness of its part. Of a part with itself only those that were in front of
+        their facet in the ``settled`` state, by default the present one, or in contact with it or the next: what is behind a facet
+        is the body itself.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
-        some, facets = pairs(points, middles, radii + np.maximum(radii, most))
+        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), nodes)
         some, facets = self._beside(nodes, points, some, facets, most)
+        some, facets = self._outside(some, facets, settled or (unknowns, None))
         there = self.other.nearest(nodes, facets, points[some])
         gap = np.einsum("ni,ni->n", points[some] - there.point, there.normal)
         beyond, before = self.other.beyond(there.at), np.full(len(points), -1)
@@ -111,17 +124,51 @@ class Pass:
         order = order[faces[order]]
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
+    def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
+        """Those pairs of points and facets of a part with itself where the point was in front of the facet, or in contact there."""
+        if self.own is None:
+            return some, facets
+        unknowns, then = settled
+        nodes, points = self.other.nodes(unknowns), self.places(unknowns)
+        height, bulge = self._heights(nodes, points, some, facets)
+        sizes = np.minimum(self.other.balls(nodes)[1], self.deepest)
+        least = np.minimum(self.law.smoothing, _DEEP * np.minimum(sizes[some // self.each], sizes[facets]))
+        before = np.full(len(points), -1)
+        if then is not None:
+            before[then.points] = then.facets
+        held = before[some] >= 0
+        held[held] = self.own.beside(before[some[held]], facets[held])
+        kept = (height > -least - bulge[facets]) | held
+        return some[kept], facets[kept]
+
+    def _near(self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
+        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm]; of a part with itself only those
+        that may touch each other (``OwnPairs.near``).
+        """
+        if self.own is None:
+            return pairs(points, balls[0], reach)
+        one, facets = self.own.near(balls, reach, *states)
+        some, facets = (one[:, None] * self.each + np.arange(self.each)).ravel(), np.repeat(facets, self.each)
+        close = np.linalg.norm(points[some] - balls[0][facets], axis=1) <= reach[facets]
+        return some[close], facets[close]
+
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
         """Pairs of points and facets, among those given, that may be at gaps up to ``most`` [mm] and less deep than the radius, by
         the plane through the middle of the facet and the heights of its nodes above that.
         """
-        middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         _, radii = self.other.balls(nodes)
+        height, bulge = self._heights(nodes, points, some, facets)
+        kept = (height < most + bulge[facets]) & (height > -(np.minimum(radii, self.deepest) + bulge)[facets])
+        return some[kept], facets[kept]
+
+    def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
+        """The heights (n,) [mm] of points over the planes through the middles of facets, and of each facet (m,) the most that it
+        may bulge from its own.
+        """
+        middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
         bulge = np.abs(heights).max(axis=1) * _BULGE
-        height = np.einsum("ni,ni->n", points[some] - middle.point[facets], middle.normal[facets])
-        kept = (height < most + bulge[facets]) & (height > -(radii + bulge)[facets])
-        return some[kept], facets[kept]
+        return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] of the points that ``met`` the other side, and its slope in the gap; what is left of an overlap
@@ -153,7 +200,7 @@ class Pass:
         areas = self.areas[met.points]
         return PressedPoints(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
 
-    def through(self, before: Floats, now: Floats, met: Met) -> Ints:
+    def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
         they are behind the facet that they were near, or passed one on their path, and are not in contact.
         """
@@ -161,7 +208,7 @@ class Pass:
         free = np.ones(len(ends), bool)
         free[met.points] = False
         old, new = self.other.nodes(before), self.other.nodes(now)
-        near = self.met(before, float(self.other.balls(old)[1].max()))
+        near = self.met(before, float(self.other.balls(old)[1].max()), None, (before, last))
         near = near.some(np.flatnonzero(free[near.points]))
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
@@ -186,8 +233,8 @@ class Pass:
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
         longest = np.linalg.norm(ends - starts, axis=1).max() / 2
-        reach = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2 + longest
-        some, facets = pairs((starts + ends) / 2, (first + last) / 2, reach)
+        radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2
+        some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii + longest, old, new)
         some, facets = some[free[some]], facets[free[some]]
         pieces = self.pieces[facets]
         each, which = pieces.shape[1], facets[:, None, None]

@@ -59,8 +59,7 @@ class Worker:
         off.
         """
         frames, settings = self.job.body.frames, self.settings
-        begins = self.job.body.rubs  # the places at which friction holds points are not kept
-        first, good = settings.first_step, self.restart.good() if self.restart and not begins else ()
+        first, good = settings.first_step, self.restart.good() if self.restart else ()
         if not self.restart or not good:
             self.report_frame(Step(frames[0], size=first))
         else:

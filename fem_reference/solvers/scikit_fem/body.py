@@ -50,20 +50,20 @@ def _check_known(body: Body) -> None:
     """Raise InputError where a body has a part that this solver knows nothing of."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
-        raise InputError(name, got, "a body without, as this solver knows no contact")
+        raise InputError(name, got, "a body without it, as this solver has no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
-        want = "springs on facets, as this solver knows no others"
+        want = "springs on facets, as this solver has no others"
         raise InputError("prescribed", "springs at points of a skin", want)
     if body.start is not None:
         raise InputError("start", "a state other than rest", "rest, from which this solver begins")
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
-        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
+        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time")
     if in_situ.among(body.effects) is not None:
         want = "effects that leave the body at rest, as this solver balances no tension there"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
-        raise InputError("effects", "membrane", "effects without: this solver has no energy of a surface")
+        raise InputError("effects", "membrane", "effects without it: this solver has no energy of a surface")
 
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:

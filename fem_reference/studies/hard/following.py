@@ -50,10 +50,10 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
     if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
-        want = "one that moves a surface, which health is of"
+        want = "one that moves a surface, whose health is measured"
         raise InputError(solver, f"a solver that moves {offer.moves}", want)
     if muscle and as_body and len(muscle.mesh.tets) > _MOST_FOR_SECOND:
-        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
+        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, for correctness and not for speed"
         raise InputError(solver, f"{len(muscle.mesh.tets)} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
     solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)

@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from slides import Slide
 
-from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
+from fem_reference import make_effect
+from fem_reference.foundations.errors import InputError
+from fem_reference.geometry import signed_distance
+from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
+from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.checks import check_agreement
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Rest
+from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.friction import Friction
 from fem_reference.verification import parts
 
@@ -94,3 +100,48 @@ def test_forces_balance_slide_at_the_friction_times_the_normal_force_and_lose_wo
     assert across == pytest.approx(0, abs=1e-9)
     works = [one.scalars["friction_work"] for one in run.states]
     assert works[0] == 0 < works[1] < works[2]
+
+
+def test_friction_begins_where_an_overlap_at_rest_is_removed(fem_lab) -> None:
+    # 5 um are removed from frame -1 to 0 below a plate that slides by 0.5 mm in each frame.
+    plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.995), (0.0, 0.0, -1.0)), Slide((0.5, 0.0, 0.0)))
+    body = replace(block(plate), frames=(-1.0, 0.0, 2.0))
+    law = replace(LAW, stiffness=1.0, smoothing=0.01, relaxed=(-1.0, 0.0))
+    rough, smooth = (
+        solved(fem_lab, replace(body, contact=replace(law, friction=friction))).states for friction in (0.3, None)
+    )
+    assert rough[1].points == pytest.approx(smooth[1].points, abs=1e-9)  # 1e-12 N over a stiffness of 0.01 N/mm
+    assert [one.scalars["friction_work"] for one in rough[:2]] == [0, 0]
+    along, _, down = rough[2].forces["plate"]
+    assert along == pytest.approx(-0.3 * down, rel=1e-9)
+    assert 0 < rough[2].scalars["friction_work"] < along * 1.0
+
+
+def test_a_bone_from_beyond_its_known_distances_drags_as_much(fem_lab) -> None:
+    # Its distance is known within 1 mm. It comes from 3 mm above and slides 1 mm at once; in one step its whole path would count
+    # as if it had been on the way for 1e6 mm.
+    surface = tessellated(Box((0.5, 0.5, 1.5), (4.0, 4.0, 1.0), 0.0), np.zeros((1, 3)), "plate")
+    plate = ContactBone("plate", signed_distance.build(surface, 0.2, 1.0), Slide((1.0, 0.0, -3.01), (0.0, 0.0, 3.0)))
+    body = replace(block(plate), frames=(0.0, 1.0))
+    once, often = (solved(fem_lab, body, first_step=step).last for step in (1.0, 0.02))
+    (drag, _, down), (other, _, _) = once.forces["plate"], often.forces["plate"]
+    assert drag == pytest.approx(0.3 * -down, rel=0.02)  # the grid rounds the plate's face by 1e-3, and tilts it
+    assert drag == pytest.approx(other, rel=0.02)
+    assert once.scalars["cut_backs"] > 0
+
+
+def test_stable_states_are_not_followed_with_friction() -> None:
+    plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.995), (0.0, 0.0, -1.0)), Slide((0.5, 0.0, 0.0)))
+    with pytest.raises(InputError, match='follow: got "stable" with friction, want "equilibrium"'):
+        fenicsx.solve_body(block(plate), fenicsx.BodySettings(element="Q1/P0", follow="stable"))
+
+
+def test_a_body_that_begins_under_tension_has_no_friction() -> None:
+    plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.995), (0.0, 0.0, -1.0)), Slide((0.5, 0.0, 0.0)))
+    body = block(plate)
+    check_agreement(body)
+    wrong = [replace(body, start=np.array), replace(body, contact=replace(LAW, in_situ=0.0))]
+    wrong += [replace(body, effects=(*body.effects, make_effect("in_situ", stretch=1.05)))]
+    for one in wrong:
+        with pytest.raises(InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest"):
+            check_agreement(one)

@@ -1,7 +1,9 @@
 """Friction between parts of a surface in load steps: what sticks goes along, what slides loses work, and a turn costs nothing."""
 
-from dataclasses import replace
+import sys
+from dataclasses import dataclass, replace
 
+import cloudpickle
 import numpy as np
 import pytest
 
@@ -30,6 +32,17 @@ def pair(path, law: Touching = LAW, below=None) -> Body:
 
 def solved(lab, body: Body):
     return lab.solve(body, "Q1/P0", first_step=0.25, residual=1e-13).last
+
+
+@dataclass(frozen=True)
+class Along:
+    """The path of 0.01 mm along x from frame to frame."""
+
+    def __call__(self, points: np.ndarray, frame: float) -> np.ndarray:
+        return np.tile([0.01 * frame, 0.0, 0.0], (len(points), 1))
+
+
+cloudpickle.register_pickle_by_value(sys.modules[__name__])  # to the process that solves, which cannot import it
 
 
 def shifted(x: float) -> Affine:
@@ -61,3 +74,20 @@ def test_a_turn_of_both_is_no_slip(fem_lab) -> None:
     # The residual of 1e-13 N, at several unknowns.
     assert turned.forces["low_z1 on high_z0"] == pytest.approx(rotation @ still.forces["low_z1 on high_z0"], abs=1e-11)
     assert turned.scalars["touching_friction_work"] == pytest.approx(still.scalars["touching_friction_work"], abs=1e-12)
+
+
+def test_no_friction_acts_while_an_overlap_at_rest_is_removed(fem_lab) -> None:
+    # 1 um of overlap, as in all tests here, is removed from frame 0 to 1, while the top goes 0.01 mm aside and on to 0.02.
+    def states(friction: float | None):
+        body = pair(Along(), replace(LAW, friction=friction, relaxed=(0.0, 1.0)))
+        run = fem_lab.solve(replace(body, frames=(0.0, 1.0, 2.0)), "Q1/P0", first_step=0.25, residual=1e-13)
+        assert run.outcome.status == "converged"
+        return run.states
+
+    rough, smooth = states(0.3), states(None)
+    assert rough[1].points == pytest.approx(smooth[1].points, abs=1e-9)
+    assert [one.scalars["touching_friction_work"] for one in rough[:2]] == [0, 0]
+    force = rough[2].forces["low_z1 on high_z0"]
+    assert force[0] == pytest.approx(-0.3 * force[2], rel=5e-3)  # as above
+    # Slip is counted from frame 1 on, 0.01 mm; the tangential spring has k = 0.01 MPa/mm and a limit of less than 1e-4 MPa.
+    assert 0 < rough[2].scalars["touching_friction_work"] <= abs(force[0]) * 0.01

@@ -146,3 +146,21 @@ def test_a_point_stays_on_its_facet_a_little_beyond_the_edge() -> None:
     changed = [point for point in common if was[point] != by_itself[point]]
     assert changed
     assert all(held[point] == was[point] for point in changed)
+
+
+def test_a_failed_attempt_changes_no_facet_that_a_point_stays_on() -> None:
+    contact, _ = crumpled("P1/P1", 0.3)
+    unknowns, start = contact.unknowns.x.array, np.array(contact.unknowns.x.array)
+    small, far = np.zeros_like(start), np.zeros_like(start)
+    dofs = contact.passes[0].side.dofs
+    small[dofs], far[dofs] = [0.01, 0.02, 0.0], [0.3, 0.2, 0.0]
+    contact.settle()
+    unknowns[:] = start + small
+    once = residual(contact)
+    unknowns[:] = start + far
+    residual(contact)
+    unknowns[:] = start + small
+    assert abs(residual(contact) - once).max() > 1e-6 * abs(once).max()  # without going back
+    contact.go_back()
+    unknowns[:] = start + small
+    assert np.array_equal(residual(contact), once)

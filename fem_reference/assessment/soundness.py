@@ -1,0 +1,57 @@
+"""Reasons why the frames of a candidate are no answer, though every number is finite: it is named and never ranked."""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
+from fem_reference.geometry.distance import outer_windings
+from fem_reference.runs.store import Run
+
+# The enclosed volume over that of the reference: less is collapsed, more is exploded. No solver that follows the motion at all is
+# near either; the worst of those shipped is at 0.8.
+_LEAST, _MOST = 0.5, 2.0
+# The greatest distance of a vertex from the reference, over the size of the body.
+_FARTHEST = 1.0
+# The share of the surface that is inside out beyond that of the reference.
+_TURNED = 0.05
+# A vertex is stuck that moves less than the first, where the reference moves by more than the second, over the size of the body.
+_STILL, _MOVES = 1e-6, 1e-2
+
+
+def unsound(run: Run, reference: Run) -> str:
+    """The first reason that the frames of a ``run`` (f, n, 3) [mm] give, with its frame; empty where they are an answer, and for a
+    run without this surface. Only frames count that both reached, as others are not numbers.
+    """
+    if run.positions.shape != reference.positions.shape:
+        return ""  # lines, or another surface
+    both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
+    for i in np.flatnonzero(both):
+        if why := _of_frame(run, run.positions[i], reference.positions[i]):
+            return f"{why} in frame {run.numbers[i]}"
+    return _stuck(run.positions[both], reference.positions[both]) if both.any() else ""
+
+
+def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
+    """The reason at a frame, from positions (n, 3) [mm]; empty without one."""
+    triangles, size = run.surface.triangles, diagonal(run.surface.points)
+    away = float(np.linalg.norm(mine - truth, axis=1).max())
+    if not away <= _FARTHEST * size:
+        return f"exploded: a vertex is {away:.3g} mm from the reference, the body {size:.3g} mm long"
+    share = enclosed_volume(mine, triangles) / enclosed_volume(truth, triangles)
+    if not _LEAST <= share <= _MOST:
+        return f"{'exploded' if share > 1 else 'collapsed'}: {share:.3g} times the volume of the reference"
+    turned = _inside_out(run, mine) - _inside_out(run, truth)
+    return f"inside out: {100 * turned:.3g} % of the surface" if turned > _TURNED else ""
+
+
+def _inside_out(run: Run, points: Floats) -> float:
+    return float(np.mean(outer_windings(run.surface.moved_to(points)) < 0))
+
+
+def _stuck(mine: Floats, truth: Floats) -> str:
+    """The vertices that rest in all frames while the reference moves them: those of elements that a solver dropped."""
+    size = diagonal(truth[0])
+    moved, wanted = (np.linalg.norm(one - one[0], axis=2).max(axis=0) / size for one in (mine, truth))
+    stuck = (moved < _STILL) & (wanted > _MOVES)
+    if not stuck.any():
+        return ""
+    return f"stuck: {stuck.sum()} vertices never move, by up to {wanted[stuck].max() * size:.3g} mm in the reference"

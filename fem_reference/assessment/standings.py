@@ -1,0 +1,159 @@
+"""Rows of standings: what each solver reached on each case, with provenance; which are stale, and what changed since before."""
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+from fem_reference.assessment.fronts import Point
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, parse
+from fem_reference.io import texts
+
+# Of what is measured and how: rows of another number are stale.
+PROTOCOL = 1
+STATES = ("failed", "stale")
+# What rows are compared by, [mm]; its value in other units; and where it is matched: an error [mm], the time of a frame number [s].
+ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
+MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
+_COST = "seconds_per_frame"
+
+
+class Standing(Record):
+    """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
+    empty for the reference, which has ``bars``. ``unsound``: why its frames are no answer. ``split``: by part the root mean square
+    [mm] of its error. ``least_error`` [mm] of its settings within the matched time, ``least_time`` [s] within the error. ``truth``
+    and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``: True where
+    case, reference, solver or protocol changed since.
+    """
+
+    case: str
+    group: str
+    name: str
+    version: str
+    status: str
+    message: str
+    unsound: str = ""
+    seconds_per_frame: float | None = None
+    worst: dict[str, float | None]
+    bars: dict[str, float]
+    split: dict[str, float]
+    least_error: float | None = None
+    least_time: float | None = None
+    truth: str
+    run: str
+    frames: str
+    date: str
+    machine: str
+    protocol: int
+    stale: bool = False
+
+    @property
+    def failed(self) -> bool:
+        """True where it is not to be ranked."""
+        return self.status != "converged" or bool(self.unsound)
+
+    def is_of(self, truth: str, run: str) -> bool:
+        """True where it was measured by this protocol, on runs of these keys."""
+        return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
+
+    def asked(self, only: Collection[str]) -> bool:
+        """True where it is to be made anew: ``only`` some states, or all where that is empty."""
+        return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
+
+
+class Standings(Record):
+    """The ``rows``; ``missing``: by case, or case and solver, why there is none; ``changes`` since those before, in words."""
+
+    rows: tuple[Standing, ...]
+    missing: dict[str, str]
+    changes: tuple[str, ...] = ()
+    protocol: int = PROTOCOL
+
+    @property
+    def cases(self) -> list[str]:
+        """The cases, in order."""
+        return list(dict.fromkeys(row.case for row in self.rows))
+
+    def of(self, case: str) -> list[Standing]:
+        """The rows of a case, by group and error; what failed comes last in its group, in no order."""
+        groups = list(dict.fromkeys(row.group for row in self.rows))
+        return sorted(
+            (row for row in self.rows if row.case == case),
+            key=lambda row: (groups.index(row.group), row.failed, _error(row, ERROR)),
+        )
+
+    def overall(self) -> list["OverCases"]:
+        """Every solver over its cases, by group and share of cases that it solved, then by error."""
+        solvers = dict.fromkeys((row.group, row.name) for row in self.rows)
+        found = [OverCases.of([row for row in self.rows if (row.group, row.name) == one]) for one in solvers]
+        groups = list(dict.fromkeys(one.group for one in found))
+        return sorted(found, key=lambda one: (groups.index(one.group), len(one.lost) / one.count, one.share))
+
+
+@dataclass(frozen=True)
+class OverCases:
+    """A solver over ``count`` cases: the medians of its error in per cent of the travel (``share``, NaN for the reference) and of
+    its time [s], and the cases that it ``lost``.
+    """
+
+    group: str
+    name: str
+    count: int
+    share: float
+    seconds: float
+    lost: tuple[str, ...]
+
+    @classmethod
+    def of(cls, rows: Sequence[Standing]) -> "OverCases":
+        """The rows of one solver together."""
+        sound = [row for row in rows if not row.failed]
+        shares = [value for row in sound if math.isfinite(value := _error(row, SHARE))]
+        times = [row.seconds_per_frame for row in sound if row.seconds_per_frame is not None]
+        lost = tuple(row.case for row in rows if row.failed)
+        share, seconds = (median(found) if found else math.nan for found in (shares, times))
+        return cls(rows[0].group, rows[0].name, len(rows), share, seconds, lost)
+
+
+def _error(row: Standing, name: str) -> float:
+    value = row.worst.get(name)
+    return math.inf if value is None or math.isnan(value) else value
+
+
+def matched(points: Iterable[Point]) -> tuple[float | None, float | None]:
+    """The least error [mm] of ``points`` of a solver within the matched time, and the least time [s] within the matched error."""
+    pairs = [pair for point in points if (pair := point.at(ERROR, _COST))]
+    errors, times = ([e for e, t in pairs if t <= MATCHED_TIME], [t for e, t in pairs if e <= MATCHED_ERROR])
+    return min(errors, default=None), min(times, default=None)
+
+
+def load(path: Path) -> tuple[Standing, ...]:
+    """The rows of standings that were written to ``path``; none where there is no file. InputError where it is another file."""
+    if not path.exists():
+        return ()
+    found = texts.read_json(path, "standings as the verb standings writes them")
+    if not isinstance(found, dict):
+        raise InputError(path, "no table", "standings as the verb standings writes them")
+    return parse(Standings, found, str(path)).rows
+
+
+def changes(before: Iterable[Standing], after: Iterable[Standing]) -> tuple[str, ...]:
+    """Rows that are new, gone, or of another status, and errors that changed by more than the error bar of the reference, in
+    words; nothing where there was nothing ``before``.
+    """
+    old, new = ({(row.case, row.name): row for row in rows} for rows in (before, after))
+    if not old:
+        return ()
+    bars = {row.case: row.bars.get(ERROR, 0.0) for row in new.values() if row.bars}
+    lines = [f"{case}, {name}: new" for case, name in new.keys() - old.keys()]
+    lines += [f"{case}, {name}: gone" for case, name in old.keys() - new.keys()]
+    for key in old.keys() & new.keys():
+        one, other = old[key], new[key]
+        ends = [row.unsound.partition(":")[0] or row.status for row in (one, other)]
+        values = [_error(row, ERROR) for row in (one, other)]
+        if ends[0] != ends[1]:
+            lines.append(f"{', '.join(key)}: {ends[0]}, now {ends[1]}")
+        elif all(map(math.isfinite, values)) and abs(values[1] - values[0]) > max(bars.get(key[0], 0.0), 1e-6):
+            lines.append(f"{', '.join(key)}: {values[0]:.3g} mm, now {values[1]:.3g} mm")
+    return tuple(sorted(lines))

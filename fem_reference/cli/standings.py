@@ -1,0 +1,49 @@
+"""The verb ``standings``: one page on which our solvers, other people's programs and submitted frames stand, over cases."""
+
+import argparse
+from pathlib import Path
+
+from fem_reference.assessment.standings import STATES, load
+from fem_reference.cli import DONE, SOLVER_FAILED, out
+from fem_reference.cli._cases import check_names, muscle_case, publish
+from fem_reference.cli._parser import share
+from fem_reference.foundations.errors import InputError
+from fem_reference.report import standings_page
+from fem_reference.report.asked import Asked
+from fem_reference.solvers import fenicsx
+from fem_reference.studies import standings
+
+HELP = "write the page on which our solvers and other people's stand, over cases; what did not change is not run again"
+PAGE = "standings"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("cases", metavar="CASE", nargs="*", help=f"a case (default: {', '.join(standings.CASES)})")
+    program = (
+        "a folder NAME with a program NAME.py and its candidate.toml, such as candidates/newton_vbd; may be repeated"
+    )
+    parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
+    submitted = "a folder of frames whose candidate.toml has case, name, version and sha256; no code of it is run; may be repeated"
+    parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
+    only = f"keep the rows of the last standings but those of these states: {','.join(STATES)}, and new ones"
+    parser.add_argument("--only", default="", metavar="STATES", help=only)
+    parser.add_argument("--quick", action="store_true", help="cases at their sizes for quick solutions")
+    share(parser, "--set", "--name")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure what is new or changed, and write the page."""
+    only = {state for state in options.only.split(",") if state}
+    if not only <= {*STATES}:
+        raise InputError("--only", f'"{options.only}"', f"some of {','.join(STATES)}")
+    cases = [muscle_case(case, options, quick=options.quick) for case in options.cases or standings.CASES]
+    entrants = [standings.program(folder) for folder in options.program]
+    entrants += [standings.submission(folder) for folder in options.submission]
+    check_names([f"{one.candidate.name} {one.case}" for one in entrants])
+    before = load(out(options) / f"{options.page_name or PAGE}.json")
+    with fenicsx.shared():
+        found = standings.stand(cases, out(options) / "runs", entrants, before, only)
+    page = standings_page.page(found)
+    publish(options, Asked(PAGE, PAGE), page, page.numbers, standings_page.text(found))
+    return SOLVER_FAILED if found.missing else DONE

@@ -1,0 +1,38 @@
+"""The page ``standings``: solvers of all kinds over cases, one table on top, and a table of each case."""
+
+from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
+from fem_reference.metrics import described
+from fem_reference.report.pages import Page
+
+COLUMNS = tuple((".".join(key), one.label, one.full_unit) for key, one in described("solvers").items())
+
+
+def page(found: Standings) -> Page:
+    """The page of standings."""
+    longest = max((sum(row.split.values()) for row in found.rows), default=0.0)
+    contents = {
+        "found": found,
+        "columns": COLUMNS,
+        "longest": longest or 1.0,
+        "matched": (MATCHED_ERROR, MATCHED_TIME),
+    }
+    said = f"{len(found.rows)} results on {len(found.cases)} cases"
+    numbers = found.model_dump(mode="json")
+    return Page("standings", "Standings", (("", "", said),), "standings_page.html", contents, numbers)
+
+
+def text(found: Standings) -> str:
+    """The rows, what is missing and what changed, as lines of text."""
+    lines = [_line(row) for case in found.cases for row in found.of(case)]
+    lines += [f"{name}: left out, {why}" for name, why in found.missing.items()]
+    return "\n".join([*lines, *(f"changed: {line}" for line in found.changes)])
+
+
+def _line(row: Standing) -> str:
+    value, bar = row.worst.get(ERROR), row.bars.get(ERROR)
+    ended = row.unsound or row.status
+    parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {ended}{' (stale)' if row.stale else ''}"]
+    parts += [] if value is None or row.failed else [f"surface rms {value:.3g} mm"]
+    parts += [] if bar is None else [f"surface rms known to {bar:.2g} mm"]
+    parts += [f"{name} {part:.3g} mm" for name, part in row.split.items()]
+    return ", ".join(parts)

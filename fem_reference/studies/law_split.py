@@ -1,0 +1,80 @@
+"""Error of a solver with tetrahedra as a sum: what it left out, its law, its mesh, its convergence, by references in its law."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fem_reference.effects import Effect, make, moduli, name_of
+from fem_reference.foundations.errors import InputError
+from fem_reference.runs.store import Run
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies.execution import Bench
+
+# Effects of a case that the law of a solver stands for.
+_LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
+PARTS = ("left out", "law", "mesh", "convergence")
+
+
+@dataclass(frozen=True)
+class Split:
+    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface's vertices at the ``frame`` where the
+    total is greatest; the sum of the parts bounds it.
+    """
+
+    frame: int
+    total: float
+    parts: dict[str, float]
+
+
+def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
+    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``."""
+    found = moduli(case.effects)
+    mu, bulk = found.shear, found.bulk
+    ratio = min((3 * bulk - 2 * mu) / (2 * (3 * bulk + mu)), poisson)
+    return mu, 2 * mu * ratio / (1 - 2 * ratio)
+
+
+def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
+    """The error of a ``run`` by a solver of a ``law`` on the tetrahedra of the case, linear in each, without springs; ``takes``:
+    the other effects that it has. InputError where a reference in between has no solution.
+    """
+    path = [bench.reference(), *_references(bench, law, takes), run]
+    frames = np.isfinite(run.positions).all(axis=(1, 2))
+    totals = [_apart(path[0], run, i) if there else -1.0 for i, there in enumerate(frames)]
+    worst = int(np.argmax(totals))
+    steps = (_apart(one, other, worst) for one, other in pairwise(path))
+    return Split(run.numbers[worst], totals[worst], dict(zip(PARTS, steps, strict=True)))
+
+
+def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -> Iterator[Run]:
+    """References without what the solver leaves out; in its law; and so with linear tetrahedra."""
+    case = bench.scene
+    others = [one for one in case.effects if name_of(one) in takes]
+    held = tuple(one.model_copy(update={"stiffness": None}) for one in case.attachment)
+    whole = [one for one in case.effects if name_of(one) in _LAW]
+    for effects, element in ((whole, ""), ([law], "P2"), ([law], "P1")):
+        choice = case.reference.model_copy(update={"element": element}) if element else case.reference
+        changed = {
+            "effect": (*effects, *others),
+            "attachment": held,
+            "reference": choice,
+            "choice": "listed",
+            "expect": (),
+        }
+        made = Bench(case.model_copy(update=changed), bench.store).reference()
+        if made.outcome.status != "converged":
+            got = f"a reference with {name_of(effects[0])} {element} that {made.outcome.status}: {made.outcome.message}"
+            raise InputError(case.place, got, "one that reaches all frames")
+        yield made
+
+
+def _apart(one: Run, other: Run, i: int) -> float:
+    return float(np.sqrt(((one.positions[i] - other.positions[i]) ** 2).sum(axis=1).mean()))
+
+
+def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
+    """The effect ``name`` with the parameters of the matrix of a ``case``."""
+    mu, second = lame(case, poisson)
+    return make(name, mu=mu, lame=second)

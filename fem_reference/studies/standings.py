@@ -1,0 +1,194 @@
+"""Standings made: the reference, our solvers, other people's programs and submitted frames on cases; rows that hold are kept."""
+
+import hashlib
+import logging
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.assessment import standings
+from fem_reference.assessment.cost_study import load
+from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.solver_table import solver_kinds
+from fem_reference.assessment.soundness import unsound
+from fem_reference.assessment.standings import PROTOCOL, Standing, Standings
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
+from fem_reference.foundations.version import __version__
+from fem_reference.io import texts
+from fem_reference.metrics import MeasurementContext, context_of, in_tables
+from fem_reference.runs.key import machine
+from fem_reference.runs.store import Run, complete
+from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.solvers import command, recorded
+from fem_reference.studies import cost, law_split, refinement, table_5_1
+from fem_reference.studies.execution import Bench
+
+log = logging.getLogger(__name__)
+
+# The cases of our own geometry.
+CASES = ("hip_flexion", "box_squeeze", "box_squeeze_report")
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it ``takes``; ``case``:
+    the only one that it has frames of, empty for all.
+    """
+
+    candidate: Candidate
+    group: str
+    version: str = __version__
+    law: str | None = None
+    takes: tuple[str, ...] = ()
+    case: str = ""
+
+
+def program(folder: Path) -> Entrant:
+    """The program in a ``folder`` of that name, ``NAME/NAME.py``, with the settings of its ``candidate.toml`` as options."""
+    file = folder / recorded.ABOUT
+    said = parse(command.Description, texts.toml(file), str(file))
+    options = " ".join(f"--{key} {{{key}}}" for key in said.settings)
+    words = f"python {folder.resolve().name}.py {options} {{scene}} {{out}}"
+    found = command.choice(words, folder.resolve(), str(file))
+    return Entrant(found, said.group or table_5_1.FOREIGN, said.version or "", said.law, said.takes)
+
+
+def submission(folder: Path) -> Entrant:
+    """The frames in a ``folder``, as its ``candidate.toml`` submits them: with case, name, version and a hash of each file."""
+    said, place = recorded.about(folder), folder / recorded.ABOUT
+    for key in ("case", "name", "version", "sha256"):
+        if not getattr(said, key):
+            raise InputError(f"{place}: {key}", "nothing", "this key in a submission")
+    for path in sorted(folder.iterdir()):
+        if path.name != recorded.ABOUT and path.name not in said.sha256:
+            raise InputError(f"{place}: sha256", f"no {path.name}", "every file beside it")
+    candidate = recorded.choice(folder, None, "--submission")
+    return Entrant(candidate, said.group or table_5_1.FOREIGN, said.version or "", case=said.case or "")
+
+
+def stand(
+    scenes: Iterable[MuscleCase],
+    store: Path,
+    entrants: Sequence[Entrant],
+    before: Sequence[Standing],
+    only: Collection[str] = (),
+) -> Standings:
+    """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``. Of the rows ``before``, those of
+    other cases are kept, and with ``only`` some states (``STATES``) those in no such state.
+    """
+    rows, missing = list[Standing](), dict[str, str]()
+    for scene in scenes:
+        known = {row.name: row for row in before if row.case == scene.name}
+        try:
+            rows += _on(Bench(scene, store), entrants, known, only, missing)
+        except InputError as error:
+            missing[scene.name] = str(error)
+    done = {row.case for row in rows}
+    rows += [row for row in before if row.case not in done]
+    return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
+
+
+def _on(
+    bench: Bench[MuscleCase],
+    entrants: Sequence[Entrant],
+    known: dict[str, Standing],
+    only: Collection[str],
+    missing: dict[str, str],
+) -> Iterator[Standing]:
+    case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
+    measured = _Measured(bench, reference, context_of(bench.setup(), reference))
+    ours = [Entrant(one, kind) for kind, one, _ in table_5_1.chosen(case, solver_kinds())]
+    yield measured.row(
+        Entrant(Candidate(name="reference", **case.reference.model_dump()), table_5_1.REFERENCE), reference
+    )
+    for one in (*ours, *(one for one in entrants if one.case in ("", case.name))):
+        name = one.candidate.name
+        try:
+            key = measured.key(one)
+            old = known.get(name)
+            if old is not None:
+                old = old.model_copy(update={"stale": not old.is_of(measured.truth, key)})
+            if old is not None and not old.asked(only):
+                yield old
+                continue
+            log.info("%s: %s", case.name, name)
+            yield measured.row(one, complete(measured.run(one), case.numbers))
+        except InputError as error:
+            missing[f"{case.name}, {name}"] = str(error)
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """Parts that all rows of a case share."""
+
+    bench: Bench[MuscleCase]
+    reference: Run
+    context: MeasurementContext
+
+    @property
+    def truth(self) -> str:
+        return "" if self.reference.folder is None else self.reference.folder.name
+
+    def key(self, one: Entrant) -> str:
+        """The key of the run of an entrant; for submitted frames a hash of what is submitted."""
+        if one.candidate.solver == "recorded":
+            said = recorded.about(Path(one.candidate.settings["folder"]))
+            return hashlib.sha256(said.model_dump_json().encode()).hexdigest()[:16]
+        return self.bench.folder(one.candidate, one.candidate.name).name
+
+    def run(self, one: Entrant) -> Run:
+        made = self.bench.read if one.candidate.solver == "recorded" else self.bench.obtain
+        return made(one.candidate.name, one.candidate, one.candidate.name)
+
+    def row(self, one: Entrant, run: Run) -> Standing:
+        own = one.group == table_5_1.REFERENCE
+        worst = {} if own else cost.greatest(run, self.reference, self.context, in_tables())
+        seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
+        least = standings.matched([*self._studied(one), _point(run, one, worst, seconds)])
+        return Standing(
+            case=self.bench.scene.name,
+            group=one.group,
+            name=run.name,
+            version=one.version,
+            status=run.outcome.status,
+            message=run.outcome.message,
+            unsound=why,
+            seconds_per_frame=seconds,
+            worst={name: value if np.isfinite(value) else None for name, value in worst.items()},
+            bars=cost.known(refinement.stored(run)) if own else {},
+            split={} if why or own else self._split(one, run),
+            least_error=None if why or own else least[0],
+            least_time=None if why or own else least[1],
+            truth=self.truth,
+            run=self.truth if own else self.key(one),
+            frames=hashlib.sha256(np.ascontiguousarray(run.positions).tobytes()).hexdigest(),
+            date=datetime.now(UTC).strftime("%Y-%m-%d"),
+            machine=str(run.origin.get("machine", machine())),
+            protocol=PROTOCOL,
+        )
+
+    def _split(self, one: Entrant, run: Run) -> dict[str, float]:
+        """The parts of the error of a solver that states its law; none of one that reached no frame, and without a law."""
+        if one.law is None or run.outcome.status != "converged":
+            return {}
+        law = law_split.law_of(one.law, self.bench.scene, float(one.candidate.settings["poisson"]))
+        return law_split.split(self.bench, run, law, one.takes).parts
+
+    def _studied(self, one: Entrant) -> list[Point]:
+        """The points of a stored study of an entrant on this case, against this truth."""
+        found = [study for path in self.bench.store.parent.glob(f"*/{cost.FILE}") for study in load(path)]
+        mine = (one.candidate.name, one.candidate.solver)
+        return [
+            p for study in found if study.truth_key == self.truth for p in study.points if {p.name, p.solver} & {*mine}
+        ]
+
+
+def _point(run: Run, one: Entrant, worst: dict[str, float], seconds: float | None) -> Point:
+    costs = {} if seconds is None else {"seconds_per_frame": seconds}
+    named = str(run.origin.get("case", "")), one.candidate.solver, run.name
+    return Point(*named, "", "", {}, run.outcome.status, "", worst, costs)

@@ -1,0 +1,138 @@
+"""Standings made: ours, a program and a submission on a case; rows that hold are kept, stale ones marked, submissions checked."""
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+import stand_ins
+
+from fem_reference import cli
+from fem_reference.assessment.standings import ERROR
+from fem_reference.io import files
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.solvers import fenicsx
+from fem_reference.studies import standings, table_5_1
+
+pytestmark = pytest.mark.slow
+
+PROGRAM = """
+import pathlib, shutil, sys
+scene, out = map(pathlib.Path, sys.argv[3:])
+for frame in (0, 5, 10, 15, 20):
+    shutil.copy(scene / "muscle.ply", out / f"frame_{frame:04d}.ply")
+"""
+
+
+def shift(problem, _, sink) -> Outcome:
+    """In place of the reference: everything moves up, by a hundredth of the frame number [mm]."""
+    for number in problem.frames:
+        up = np.array([0, 0, number / 100])
+        sink(Frame(number, problem.surface.points + up, problem.fibres.points + up))
+    return Outcome("converged", "done", {"seconds_solve": 8.0})
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch) -> Path:
+    """A folder with the small case, the program ``still``, and frames of it 1 mm off in the last."""
+    stand_ins.solve_by(monkeypatch, fenicsx, shift)
+    stand_ins.unchecked(monkeypatch)
+    monkeypatch.setattr(table_5_1.solvers, "in_table", lambda _kind=None: ())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
+    small.write(tmp_path / "bar")
+    Path("still").mkdir()
+    Path("still/still.py").write_text(PROGRAM)
+    Path("still/candidate.toml").write_text('name = "still"\nversion = "7"\ngroup = "Theirs"\n[settings]\nspeed = 1\n')
+    submit(tmp_path / "mine")
+    return tmp_path
+
+
+def submit(folder: Path, **about: str) -> None:
+    folder.mkdir(exist_ok=True)
+    body, hashes = small.body(), {}
+    for frame in (0, 5, 10, 15, 20):
+        path = folder / f"frame_{frame:04d}.ply"
+        files.write_surface(path, body, body.points + [0, 0, frame / 100 + (frame == 20)])
+        hashes[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    said = {"name": "mine", "version": "2", "case": "bar", "unit": "mm"} | about
+    lines = [f'{key} = "{value}"' for key, value in said.items() if value]
+    lines += ["[sha256]", *(f'"{name}" = "{value}"' for name, value in hashes.items())]
+    (folder / "candidate.toml").write_text("\n".join(lines))
+
+
+def stand(*words: str) -> dict:
+    assert cli.main(["standings", "./bar", *words, "--quiet"]) in (cli.DONE, cli.SOLVER_FAILED)
+    return json.loads(Path("reports/standings.json").read_text())
+
+
+@pytest.mark.usefixtures("place")
+def test_everybody_stands_with_provenance_and_what_holds_is_kept(monkeypatch) -> None:
+    first = stand("--program", "still", "--submission", "mine")
+    rows = {row["name"]: row for row in first["rows"]}
+    assert [(row["group"], row["name"], row["version"]) for row in first["rows"]][1:] == [
+        ("Theirs", "still", "7"),
+        ("Yours", "mine", "2"),
+    ]
+    assert rows["mine"]["worst"][ERROR] == pytest.approx(1, abs=1e-6)
+    assert rows["mine"]["status"] == "converged"
+    assert rows["mine"]["unsound"] == ""
+    assert rows["still"]["unsound"].startswith("stuck: ") is False  # the reference moves by 0.2 mm alone
+    assert all(row["date"] and row["machine"] and len(row["frames"]) == 64 for row in first["rows"])
+    assert first["missing"] == {}
+    assert first["changes"] == []
+    page = Path("reports/standings.html").read_text()
+    assert "Theirs" in page
+    assert "still" in page
+
+    def never(*_):
+        raise AssertionError("it is run again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(standings._Measured, "run", never)
+        assert stand("--program", "still", "--submission", "mine", "--only", "failed,stale")["rows"] == first["rows"]
+    Path("still/still.py").write_text(PROGRAM + "# another version\n")
+    kept = stand("--program", "still", "--submission", "mine", "--only", "failed")
+    assert [row["stale"] for row in kept["rows"]] == [False, True, False]
+    assert "stale" in Path("reports/standings.html").read_text()
+    anew = stand("--program", "still", "--submission", "mine", "--only", "stale")
+    assert [row["stale"] for row in anew["rows"]] == [False] * 3
+    assert anew["rows"][1]["run"] != first["rows"][1]["run"]
+
+
+def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) -> None:
+    def refused(want: str) -> None:
+        assert cli.main(["standings", "./bar", "--submission", "mine"]) == cli.BAD_INPUT
+        assert want in capsys.readouterr().err
+
+    for key in ("case", "version", "name"):
+        submit(place / "mine", **{key: ""})
+        refused(f"candidate.toml: {key}: got nothing, want this key in a submission")
+    submit(place / "mine")
+    (place / "mine" / "more.ply").write_text("x")
+    refused("sha256: got no more.ply, want every file beside it")
+    (place / "mine" / "more.ply").unlink()
+    body = small.body()
+    files.write_surface(place / "mine" / "frame_0020.ply", body, body.points)
+    found = stand("--submission", "mine")
+    assert [row["name"] for row in found["rows"]] == ["reference"]
+    assert "sha256.frame_0020.ply" in found["missing"]["bar, mine"]
+
+
+@pytest.mark.usefixtures("place")
+def test_a_program_states_its_group_and_law() -> None:
+    found = standings.program(Path("still"))
+    assert (found.group, found.version, found.law, found.candidate.settings["speed"]) == ("Theirs", "7", None, 1)
+    law = standings.program(Path(__file__).parents[2] / "candidates" / "mujoco_flex")
+    assert (law.group, law.law, law.takes) == ("Implicit FEM", "st_venant_kirchhoff", ())
+    assert casefile.read("hip_flexion").name in standings.CASES
+
+
+@pytest.mark.usefixtures("place")
+def test_bad_states_are_named(capsys) -> None:
+    assert cli.main(["standings", "./bar", "--only", "old"]) == cli.BAD_INPUT
+    assert '--only: got "old", want some of failed,stale' in capsys.readouterr().err
