@@ -40,7 +40,7 @@ def _placed(name: str) -> str:
     measurement, draw = DRAWN[name]
     found = draw(kept(measurement)["measured"])
     said = re.sub("`(.*?)`", r"<code>\1</code>", f"{found.title.rstrip('.')}. {origin(measurement)}")
-    return f'```{{raw}} html\n<div class="drawn">{found.markup}<p>{said}</p></div>\n```\n'
+    return f'```{{raw}} html\n<div class="drawn">{found.markup}</div>\n<p class="caption-of">{said}</p>\n```\n'
 
 
 def cost_front(measured: dict[str, Any]) -> Drawing:

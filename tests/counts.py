@@ -198,6 +198,7 @@ ADDED = {
     "contact between parts of the surface": 740,
     "several muscles in one scene": 1080,
     "friction": 590,
+    "contact of a part with itself": 130,
     "own solvers as commands, load of the machine, answers first": 880,
     "laws of other people's solvers, split errors, standings": 700,
 }

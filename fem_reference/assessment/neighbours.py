@@ -20,7 +20,7 @@ _BULGE = 0.05
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     """The check that no muscle is in another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
-    Allowed are the give of contact, and what facets bulge.
+    Allowed are the give of contact under the pressure of the two, and what facets bulge. Not met where no tetrahedra are stored.
     """
     if not problem.apart:
         return ()
@@ -28,18 +28,18 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     for pair in combinations(problem.spans, 2):
         own = pressure_name(*(called(span.name, "free") for span in pair))
         touch = (pair[0].name, pair[1].name) in problem.pairs
-        pressures = run.scalars.get(own, run.scalars.get("touching_pressure", none)) if touch else none
+        pressures = np.nan_to_num(run.scalars.get(own, run.scalars.get("touching_pressure", none)) if touch else none)
         skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
         edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
         law = problem.law
+        name = f"{pair[0].name} and {pair[1].name} in each other"
         for i, number in enumerate(run.numbers):
-            now = nodes(number)
-            if now is None:
+            give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
+            allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
+            if (now := nodes(number)) is None:
+                checks.append(RunCheck(f"{name} (no tetrahedra are stored)", np.nan, allowed, "mm", number))
                 continue
             depth, place = penetration(*(one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)))
-            give = 0.0 if law is None else float(np.nan_to_num(pressures[i])) / law.stiffness + law.smoothing
-            allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
-            name = f"{pair[0].name} and {pair[1].name} in each other"
             checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))
     return worst(checks)
 

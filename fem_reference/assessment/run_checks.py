@@ -24,7 +24,7 @@ from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.overlaps import longest_edge, overlap_at
 from fem_reference.problems.setup import AttachedVertices, Bone
-from fem_reference.runs.contents import scalar_vectors
+from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
 # A position is correct up to this share of the body's size; rounding of stored values is a thousandth of it.
@@ -213,9 +213,9 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     for kind, unit, arm in kinds if own and math.isfinite(allowed) else ():
         for i, value in enumerate(() if outer else run.scalars.get(f"net_{kind}", ())):
             yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, run.numbers[i])
-        bones = [bone.name for bone in problem.bones if f"{kind}_on_{bone.name}_x" in run.scalars]
-        carried = np.sum([getattr(run, kind)(bone) for bone in bones], axis=0)
-        for i, load in _loads(problem, run, kind) if outer and bones else ():
+        carriers = vector_names(run.scalars, f"{kind}_on_")  # bones, and muscles that may touch it
+        carried = np.sum([getattr(run, kind)(name) for name in carriers], axis=0)
+        for i, load in _loads(problem, run, kind) if outer and carriers else ():
             off, rounding = (float(np.linalg.norm(one)) for one in (carried[i] - load, _ROUNDING * load))
             yield RunCheck(f"{kind}s that bones do not carry", off, allowed * arm + rounding, unit, run.numbers[i])
 

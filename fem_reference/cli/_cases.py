@@ -171,20 +171,25 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
         return _compared_muscles(bench, options, chosen)
     with fenicsx.shared():
         result = judged(bench, options, chosen)
-    alone = bool(case.candidate) and not chosen  # a page of the reference, beside that of all
-    who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
-    wanted = asked("run" if alone else "compare", case, options, "report", *who)
+    wanted = _page(case, options, chosen, "report")
     text = "\n".join([comparison_text(result), *unturned(options, result.word)])
     publish(options, wanted, report.of_comparison(result), report.summary(result), text)
     return status([result])
+
+
+def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]], page: str) -> Asked:
+    """The ``page`` of a comparison: of the reference where there are candidates and none is chosen, beside that of all."""
+    alone = bool(case.candidate) and not chosen
+    who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
+    return asked("run" if alone else "compare", case, options, page, *who)
 
 
 def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge each of several muscles, and write a page for each."""
     with fenicsx.shared():
         found = by_muscle.compared(bench, chosen)
-    case, who = bench.scene, candidates(bench.scene, [entry for entry, _ in chosen])
-    texts, pages, facts = list[str](), list[str](), dict[str, Any]({"case": case.name, "muscles": {}})
+    case, texts, pages = bench.scene, list[str](), list[str]()
+    facts: dict[str, Any] = {"case": case.name, "muscles": {}}
     for name, result in found.muscles.items():
         texts.append(f"{name}:\n{comparison_text(result)}")
         facts["muscles"][name] = report.summary(result)
@@ -197,7 +202,7 @@ def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: li
     facts["lacking"] = [{"solver": who, "muscle": muscle} for who, muscle in found.lacking]
     write_output(facts, "\n".join([*texts, by_muscle.ALONE, *unturned(options, word)]), options)
     for name, result in found.muscles.items():
-        wanted = asked("compare", case, options, f"report_{name}", *who)
+        wanted = _page(case, options, chosen, f"report_{name}")
         pages += written(wanted, report.of_comparison(result), out(options), options.page_name)[1]
     print(*pages, sep="\n")
     return status(found.muscles.values())

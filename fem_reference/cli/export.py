@@ -14,8 +14,10 @@ from fem_reference.report.words import duration
 from fem_reference.runs import states
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies import judging, refinement
+from fem_reference.scenes.muscles import MusclesCase
+from fem_reference.studies import by_muscle, judging, refinement
 from fem_reference.studies.execution import Bench
 
 HELP = "write all that another solver needs, in open formats; or runs for ParaView"
@@ -39,14 +41,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write a case for another solver, or its runs for ParaView."""
-    scene = casefile.muscle(scene_of(options))
+    scene = scene_of(options)
     if options.format == PARAVIEW:
-        return _runs(scene, options)
+        return _runs_of_several(scene, options) if scene.parts else _runs(casefile.muscle(scene), options)
     if options.candidate or options.unit or options.solve:
         got = f"--candidate, --unit or --solve for {options.format}"
         raise InputError("export", got, f"them for {PARAVIEW} only")
-    bench = Bench(scene, out(options) / "runs")
-    written = export.export(scene, bench.problem, options.to, options.format)
+    bench = Bench(scene if isinstance(scene, MusclesCase) else casefile.muscle(scene), out(options) / "runs")
+    written = export.export(bench.scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE
@@ -64,6 +66,21 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
     facts = {"case": case.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED
+
+
+def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
+    """Write the reference and candidates of each muscle for ParaView, into a folder with its name; without states."""
+    check(options.to)
+    if options.solve:
+        raise InputError("--solve", "several muscles", "no such option: their states are not written")
+    chosen = [choose(case, text, options.unit) for text in options.candidate]
+    found = by_muscle.compared(checked_bench(case, options, chosen), chosen)
+    count = sum(len(paraview.write(one, options.to / name)) for name, one in found.muscles.items())
+    indices = [str(options.to / name / paraview.INDEX) for name in found.muscles]
+    facts = {"case": case.name, "index": indices, "files": count}
+    write_output(facts, "\n".join(lines(facts)), options)
+    every = (run for one in found.muscles.values() for run in one.runs)
+    return DONE if all(one.outcome.status == "converged" for one in every) else SOLVER_FAILED
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:

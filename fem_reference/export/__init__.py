@@ -5,10 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fem_reference.export import febio, febio_contact
+from fem_reference.export import febio, febio_contact, febio_several
 from fem_reference.export.folders import check, new_folder, write_text
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers.common import open_formats
 
@@ -20,34 +23,70 @@ _FEBIO_FILES = """\
 | `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
 | `tet10.csv` | the ten nodes of each of its elements, in the order of FEBio |
 """
+_FEBIO_OF_ALL = """
+`scene.feb` is one file of all muscles for FEBio (format 4.0). It logs `nodes_NAME.txt`: put that of a muscle into its folder as
+`nodes.txt`, and run the script of `FEBIO.md` there.
+"""
 _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the muscle at rest"
 
 
-def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, form: Format) -> list[str]:
+def export(case: Case, build: Callable[[], MuscleProblem | MusclesProblem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
-    ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. InputError where the folder is
-    not free, or FEBio has not the same.
+    ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. Of several muscles each has a folder
+    with its name, and FEBio one file of all. InputError where the folder is not free, or FEBio has not the same.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
-    if form == "febio":
-        febio.check(case)
+    for one in _parts(case) if form == "febio" else ():
+        febio.check(one)
     with new_folder(folder) as part:  # whether it can be written shows before a problem is built
-        _write(case, build(), part, form)
+        problem = build()
+        if isinstance(problem, MusclesProblem):
+            _write_several(case, problem, part, form)
+        else:
+            _write(_parts(case)[0], problem, part, _FEBIO_FILES if form == "febio" else "")
+        if form == "febio":
+            _write_febio(case, problem, part)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
     log.info("%s: %d files in %s", case.name, len(written), folder)
     return written
 
 
-def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format) -> None:
+def _parts(case: Case) -> tuple[MuscleCase, ...]:
+    """The muscles of a case."""
+    return case.parts or (casefile.muscle(case),)
+
+
+def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) -> None:
     open_formats.write(problem, folder, {"case": case.name, "title": case.title})
     write_text(folder / "candidate.toml", case)
-    write_text(folder / "README.md", case, more=_FEBIO_FILES if form == "febio" else "")
-    if form == "febio":
+    write_text(folder / "README.md", case, more=more)
+
+
+def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
+    """A folder for each muscle, and what is of all."""
+    for part, (name, one) in zip(case.parts, problem.problems.items(), strict=True):
+        (folder / name).mkdir()
+        _write(part.model_copy(update={"name": case.name}), one, folder / name, "")
+        if form == "febio":
+            febio.write_nodes(one, folder / name)
+    near = ", ".join(" and ".join(pair) for pair in problem.pairs) or "no two"
+    names = "\n".join(f"- `{name}`" for name in problem.problems)
+    write_text(
+        folder / "README.md", case, "MUSCLES.md", here=names, near=near, more=_FEBIO_OF_ALL if form == "febio" else ""
+    )
+
+
+def _write_febio(case: Case, problem: MuscleProblem | MusclesProblem, folder: Path) -> None:
+    """FEBio's own file, and its differences."""
+    if isinstance(problem, MusclesProblem):
+        differences = febio_several.notes(problem)
+        febio.write_model(febio_several.model(problem), folder)
+    else:
         differences = febio_contact.notes(problem)
-        for difference in differences:
-            log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)
-        write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))
+    for difference in differences:
+        log.warning("another model in FEBio: %s", difference)
+    write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))

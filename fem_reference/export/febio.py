@@ -54,11 +54,20 @@ def check(case: MuscleCase) -> None:
 
 
 def write(problem: MuscleProblem, folder: Path) -> None:
-    """``scene.feb`` and, for readers of FEBio's nodes, ``tet10.csv`` into ``folder``."""
+    """``scene.feb`` and ``tet10.csv`` into ``folder``."""
+    write_nodes(problem, folder)
+    write_model(model(problem), folder)
+
+
+def write_nodes(problem: MuscleProblem, folder: Path) -> None:
+    """``tet10.csv``, for readers of FEBio's nodes, into ``folder``."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
-    root = model(problem)
+
+
+def write_model(root: Element, folder: Path) -> None:
+    """``scene.feb`` into ``folder``."""
     ElementTree.indent(root, " ")
     text = ElementTree.tostring(root, encoding="unicode")
     files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')

@@ -47,16 +47,16 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
     contacts = SubElement(root, "Contact")
     for attached in febio_mesh.by_springs(problem):
         settings = {"penalty": penalty(problem, attached), "search_radius": SPRING_SEARCH_RADIUS}
-        _pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
+        pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
     deep, friction = overlaps(problem), (problem.contact.friction or 0.0) if problem.contact else 0.0
     for bone in problem.obstacles:
         assert problem.contact is not None  # or there is no contact
         radius = search_radius(problem, deep[bone.name])
         settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": friction}
-        _pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
+        pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
 
 
-def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
+def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
     """A contact of a ``kind`` between the surfaces of the pair of this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})

@@ -157,7 +157,7 @@ class Mesh:
         for attached in by_springs(self.problem):
             self._tied(mesh, attached, cells[springs_id(attached)])
 
-    def _curved(self, facets: Ints) -> Ints:
+    def curved(self, facets: Ints) -> Ints:
         """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
         ends = np.sort(facets[:, EDGES[:3]], axis=2).reshape(-1, 2).tolist()
         middles = [self.middles[a, b] for a, b in ends]
@@ -166,8 +166,8 @@ class Mesh:
     def _area(self, attached: AttachedVertices) -> Ints:
         """The triangles (m, 6) of an attachment, outward; of springs at points those with points on them."""
         if attached.attachment in self.problem.attached_skins:
-            return self._curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
-        return self._curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
+            return self.curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
+        return self.curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
         """Kind, points (n, 3) [mm] and triangles that coincide with the area attached, or with parts of it about the points of
@@ -182,31 +182,33 @@ class Mesh:
     def _attached(self, mesh: Element) -> None:
         taken: set[int] = set()
         for attached in exactly(self.problem):
-            nodes = set(self._curved(self.problem.mesh.facets[attached.attachment]).ravel().tolist()) - taken
+            nodes = set(self.curved(self.problem.mesh.facets[attached.attachment]).ravel().tolist()) - taken
             taken |= nodes
             name = f"attached_{attached.attachment}"
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
         """The contact surface, and its pairs with the bones."""
-        self._surface(mesh, "muscle_free", "tri6", self._curved(free_facets(self.problem)))
+        self.surface(mesh, "muscle_free", "tri6", self.curved(free_facets(self.problem)))
         names = [bone_id(bone) for bone in self.problem.obstacles]
         for name in names:
-            self._surface(mesh, f"{name}_surface", "tri3", cells[name])
+            self.surface(mesh, f"{name}_surface", "tri3", cells[name])
         for name in names:
-            self._pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
+            self.pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
 
     def _tied(self, mesh: Element, attached: AttachedVertices, copy: Ints) -> None:
         """The area attached and its rigid copy, the primary one: FEBio integrates over that."""
         name = springs_id(attached)
-        self._surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
-        self._surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)
-        self._pair(mesh, f"{name}_pair", f"{name}_bone", f"{name}_muscle")
+        self.surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
+        self.surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)
+        self.pair(mesh, f"{name}_pair", f"{name}_bone", f"{name}_muscle")
 
     @staticmethod
-    def _surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
+    def surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
+        """A surface by ``name`` of ``facets`` (m, 3 or 6), nodes from 0, of a ``kind``."""
         rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod
-    def _pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
+    def pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
+        """A pair of surfaces by their names."""
         leaves(SubElement(mesh, "SurfacePair", name=name), {"primary": primary, "secondary": secondary})

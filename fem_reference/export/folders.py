@@ -10,7 +10,7 @@ from string import Template
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.version import __version__
 from fem_reference.io import files
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.case import Case
 
 
 def check(folder: Path) -> None:
@@ -39,8 +39,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
                 parent.rmdir()
 
 
-def write_text(path: Path, case: MuscleCase, file: str | None = None, **values: str) -> None:
+def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
     """Write the text of a ``file`` of this folder, by default that of the same name, with facts of the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
-    known = {"title": case.title, "name": case.name, "version": __version__, "first": str(case.frames.first)}
+    known = {"title": case.title, "name": case.name, "version": __version__, "first": str(case.numbers[0])}
     files.write_text(path, template.substitute(known | values))

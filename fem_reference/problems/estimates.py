@@ -51,7 +51,7 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 class Decision:
     """Decision whether an effect is ``needed``, by its ``indicator`` (None: part of the material) and the allowed values
     ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where estimates did;
-    ``listed``: the effect acts in any case.
+    ``listed``: the effect acts in any case. ``of``: the muscle of several in which alone it acts.
     """
 
     effect: Effect
@@ -61,11 +61,22 @@ class Decision:
     stress_bound: float
     turned_out: float | None = None
     listed: bool = False
+    of: str = ""
+
+    @property
+    def title(self) -> str:
+        """The title of the effect, after the name of its muscle where it acts in that alone."""
+        return f"{self.of}: {self.effect.title}" if self.of else self.effect.title
+
+    @property
+    def why(self) -> str:
+        """The decision in words."""
+        if self.indicator is None:
+            return "kept, part of the material"
+        return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:
-        if self.indicator is None:
-            return f"{self.effect.title}: kept, part of the material"
-        return f"{self.effect.title}: {self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
+        return f"{self.title}: {self.why}"
 
     @property
     def _word(self) -> str:

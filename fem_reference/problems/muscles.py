@@ -1,14 +1,16 @@
 """Several muscles of one scene: each as a set-up and a problem of its own, and all as one body with contact between them."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fem_reference.effects import contact as contacts
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Indicator
@@ -21,11 +23,13 @@ from fem_reference.geometry.skins import spacing
 from fem_reference.problems import muscle
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decision, decisions, estimates
+from fem_reference.problems.guess import length_of, thickness_of
 from fem_reference.problems.joining import called, join
 from fem_reference.problems.muscle import RELAXING, MuscleProblem
 from fem_reference.problems.problem import AtRest, Task
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.touching import Touching
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.muscles import MusclesCase
 
 _BETWEEN = 8  # looks at a moving bone from one stop to the next
@@ -138,7 +142,7 @@ class MusclesProblem:
             assert law is not None  # without contact no pair may touch
             at = called(one, "free"), called(other, "free")
             removed = relaxed if self._near_at_rest(one, other) else None
-            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed))
+            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed, around=True))
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
@@ -175,30 +179,51 @@ def _meshes(parts: Sequence[TetMesh]) -> TetMesh:
 
 def setup(case: MusclesCase) -> MusclesSetup:
     """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names what is unusable."""
-    found = {one.name: muscle.setup(part) for one, part in zip(case.muscle, case.parts, strict=True)}
+    found = dict[str, Setup]()
+    for i, part in enumerate(case.parts):
+        with case.placed(i):
+            found[case.muscle[i].name] = muscle.setup(part)
     law = case.touching
-    pairs = () if law is None else tuple(_near(found, law.smoothing))
-    return MusclesSetup(found, pairs)
+    gaps = {} if law is None else _gaps(case, found, law.smoothing)
+    return MusclesSetup(found, tuple(pair for pair, gap in gaps.items() if law and gap < law.smoothing))
 
 
 def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
     """The problem of all muscles, each filled with tetrahedra and fibres."""
-    parts = zip(rest.muscles.items(), case.parts, strict=True)
-    known = [*case.effect, *(one.effect for one in case.decisions)]
-    apart = any(isinstance(one, MuscleContact) for one in known)
-    return MusclesProblem(
-        {name: muscle.build(part, one) for (name, one), part in parts}, rest.pairs, case.touching, apart
-    )
+    built = dict[str, MuscleProblem]()
+    for i, (part, (name, one)) in enumerate(zip(case.parts, rest.muscles.items(), strict=True)):
+        with case.placed(i):
+            built[name] = muscle.build(part, one)
+    return MusclesProblem(built, rest.pairs, case.touching, case.apart)
 
 
-def _near(muscles: dict[str, Setup], felt: float) -> Iterator[tuple[str, str]]:
-    """The pairs of muscles that may come within ``felt`` [mm] of each other."""
-    return (pair for pair in combinations(muscles, 2) if clearance(muscles[pair[0]], muscles[pair[1]]) < felt)
+def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
+    """A lower bound [mm] of the distance of each two muscles over all frames, also where they bulge, bones press them or loads
+    act; without these where the motion of the bones alone may bring them within ``felt`` [mm].
+    """
+    parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
+    beyond = cache(lambda name: _beyond(parts[name], muscles[name]))
+    for pair in combinations(muscles, 2):
+        gap = clearance(muscles[pair[0]], muscles[pair[1]])
+        found[pair] = gap if gap < felt else gap - beyond(pair[0]) - beyond(pair[1])
+    return found
+
+
+def _beyond(case: MuscleCase, rest: Setup) -> float:
+    """The distance [mm] by which a muscle may leave the place that bones give it: it bulges where it shortens at the same volume,
+    is pressed as far as a bone in contact may be in it, and moves by its length at most under external loads.
+    """
+    if any(one.outer for one in case.effects):
+        return length_of(rest)
+    known, contact = estimates(case, rest), contacts.among(case.effects)
+    bulge = thickness_of(rest) / 2 * (1 / math.sqrt(min(known.stretch[0], 1.0)) - 1)
+    bones = known.near if contact and contact.bones is None else (contact.bones or () if contact else ())
+    return bulge + max((-known.near[name].gap for name in bones if known.near[name].gap < 0), default=0.0)
 
 
 def clearance(one: Setup, other: Setup) -> float:
-    """A lower bound [mm] of the distance of two muscles over all frames: that at rest, less what either can move with a bone.
-    Below 0 where they may cross.
+    """A lower bound [mm] of the distance of two muscles over all frames that only follow the bones: that at rest, less what
+    either can move with a bone. Below 0 where they may cross.
     """
     between = max(spacing(one.surface), spacing(other.surface))  # vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
@@ -239,18 +264,18 @@ def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
             every.append(_touches(case, rest, effect))
             continue
         asked = [one for some in found for one in some if one.effect is effect]
-        every.append(next((one for one in asked if one.needed), asked[0]))
+        owner = next((one.name for one in case.muscle if any(effect is some for some in one.effect)), "")
+        every.append(replace(next((one for one in asked if one.needed), asked[0]), of=owner))
     return tuple(every)
 
 
 def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> Decision:
     """The decision on contact between muscles, by the least clearance of two."""
     known = estimates(case.parts[0], next(iter(rest.muscles.values())))
-    pairs = list(combinations(rest.muscles, 2))
-    gaps = [clearance(rest.muscles[one], rest.muscles[other]) for one, other in pairs]
-    nearest = int(np.argmin(gaps))
+    gaps = _gaps(case, rest.muscles, effect.smoothing)
+    nearest = min(gaps, key=lambda pair: gaps[pair])
     depth = max(effect.smoothing - gaps[nearest], 0.0)
-    rule = f"guaranteed clearance between muscles [mm] ({' and '.join(pairs[nearest])})"
+    rule = f"guaranteed clearance between muscles [mm] ({' and '.join(nearest)})"
     found = decision(effect, Indicator(rule, gaps[nearest], depth, effect.stiffness * depth), known)
     return replace(found, listed=case.choice == "listed")
 

@@ -121,11 +121,11 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
     """The effect of the bones' motion on a muscle, its regions, and why it needs its effects, in words; nothing of a field."""
     if isinstance(case, MusclesCase):
         every = case.decisions or explained(case, lambda: setup)
-        return {"effects": {one.effect.title: str(one).partition(": ")[2] for one in every}}
+        return {"effects": {one.title: one.why for one in every}}
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)
-    effects = {one.effect.title: str(one).partition(": ")[2] for one in found}
+    effects = {one.title: one.why for one in found}
     motion = described_motion(setup)
     parts = {"regions": regions.facts(setup)} if setup.regions else {}
     return ({"motion": motion} if motion else {}) | parts | {"effects": effects}

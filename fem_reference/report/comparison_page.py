@@ -173,7 +173,7 @@ def _sentence(comparison: Comparison) -> str:
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
     compared = f"{listed(names)} compared with the reference" if names else "The reference"
     words = [verdict.word for verdict in comparison.verdicts]
-    met = f"{words.count('pass')} of {len(words)} expectations met"
+    met = f"{words.count('pass')} of {len(words)} expectations met" if words else "nothing is expected"
     alone = "" if names else ", without a candidate"
     solver = comparison.reference.solver
     return f"{compared} computed by {solver}, over {len(numbers)} frames ({numbers[0]} to {numbers[-1]}){alone}: {met}."

@@ -8,6 +8,7 @@ const MUSCLE = "#b4574e", BONE = "#dedbd4", UNKNOWN = "#85878d", SEEN_THROUGH = 
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 {% include "viewer_scale.js" %}
+{% include "viewer_marks.js" %}
 
 async function unpacked(text) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -59,7 +60,7 @@ async function assembled() {
   const bones = await Promise.all(data.bones.map(bone));
   const ghost = new three.Mesh(runs[0].mesh.geometry, look("#000000", { transparent: true, opacity: 0.25, depthWrite: false }));
   ghost.renderOrder = 1;
-  scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh, run.arrows]), ...bones.map((each) => each.mesh), ghost);
+  scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh, run.arrows, ...run.marks.all]), ...bones.map((each) => each.mesh), ghost);
   const controls = new three.OrbitControls(camera, renderer.domElement);
   controls.enableZoom = false; // until the picture has the focus: else nobody could scroll past it
   renderer.domElement.style.touchAction = "pan-y";
@@ -76,11 +77,12 @@ async function muscle(run, faces) {
   const geometry = new three.BufferGeometry();
   geometry.setIndex(faces);
   for (const name of ["position", "color"]) geometry.setAttribute(name, new three.BufferAttribute(new Float32Array(stride), 3));
-  const mesh = new three.Mesh(geometry, look(MUSCLE));
+  const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // its marks
+  const mesh = new three.Mesh(geometry, look(MUSCLE, behind));
   mesh.frustumCulled = false;
   const packed = await Promise.all(Object.entries(run.levels).map(async ([name, text]) => [name, await levels(text)]));
-  const own = { levels: Object.fromEntries(packed), strands: await fibres(run), arrows: arrows(run), bins: new Float32Array(BINS), greatest: 0, label: label(run.name) };
-  return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true }), ...own };
+  const own = { levels: Object.fromEntries(packed), strands: await fibres(run), arrows: arrows(run), marks: await marks(run, geometry), bins: new Float32Array(BINS), greatest: 0, label: label(run.name) };
+  return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true, ...behind }), ...own };
 }
 
 async function bone(data) {
@@ -93,7 +95,7 @@ async function bone(data) {
   const mesh = new three.Mesh(geometry, look(BONE));
   mesh.matrixAutoUpdate = false;
   mesh.frustumCulled = false;
-  return { mesh, poses: data.poses };
+  return { mesh, poses: data.poses, plate: geometry.index.count <= PLATE };
 }
 
 function label(name) {
@@ -159,6 +161,7 @@ function place(run) {
   }
   if (isOn("fibres")) lay(run);
   pull(run);
+  touch(run);
   describe(run, chosen);
 }
 
@@ -233,10 +236,11 @@ function pane({ run, left, top }) {
     each.mesh.visible = each === run && run.reached[frame];
     each.arrows.visible = each.mesh.visible && isOn("forces");
     each.strands.mesh.visible = each.mesh.visible && isOn("fibres");
+    showMarks(each);
   });
-  const within = quantity()?.name === "depth"; // what is in a bone is seen through it
-  view.bones.forEach(({ mesh }) => {
+  view.bones.forEach(({ mesh, plate }) => {
     mesh.visible = isOn("bones");
+    const within = plate || quantity()?.name === "depth"; // what is in a bone is seen through it, and what is behind a plate
     Object.assign(mesh.material, { transparent: within, opacity: within ? SEEN_THROUGH : 1, depthWrite: !within });
   });
   ghost.visible = isOn("laid") && compared;
@@ -272,7 +276,7 @@ function listen() {
   part("front").addEventListener("click", () => lookFrom(data.camera.directions[0]));
   part("side").addEventListener("click", () => lookFrom(data.camera.directions[1]));
   part("bones").addEventListener("change", draw);
-  part("forces")?.addEventListener("change", draw);
+  for (const name of ["forces", "attached", "touched"]) part(name)?.addEventListener("change", draw);
   part("fibres").addEventListener("change", () => show(view.frame));
   part("laid")?.addEventListener("change", arrange);
   part("quantity")?.addEventListener("change", choose);

@@ -11,7 +11,7 @@ What ``viewer.js`` unpacks is one JSON object. Arrays in it are little-endian, c
                vertices are outside of the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the
                frame before, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
-    force      the greatest force drawn [N]
+    force      the greatest force drawn [N];  attached  the vertices that are attached to bones
     and what ``viewer_fields`` says: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
@@ -34,7 +34,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
-from fem_reference.report.viewer_fields import Fields, arrows, joints
+from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
@@ -70,7 +70,8 @@ def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
     """The contents of the template of the 3D view: the ``data`` for the script, the names of the ``candidates`` and ``quantities``,
     the frame ``numbers``, one frame in how many is drawn (``every``: more than one where positions would have more bytes than
     ``budget``), the greatest ``error`` of a coordinate [mm], the colours of fibres (``warm``) and where on their scale [%] which
-    ``stretches`` are, the greatest ``force`` drawn [N], 0 without any, and ``version`` and ``licence`` of the library.
+    ``stretches`` are, the greatest ``force`` drawn [N], 0 without any, whether
+    vertices are ``attached`` or ``touched``, how ``near`` [mm] that is, and ``version`` and ``licence`` of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
     every = _every(shown, budget)
@@ -86,6 +87,9 @@ def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
         "warm": data["warm"],
         "stretches": _ends(data["fibres"]),
         "force": data["force"],
+        "attached": bool(data["attached"]),
+        "touched": any("touched" in run for run in data["runs"]),
+        "near": NEAR,
         "version": card["version"],
         "licence": (THREE / "LICENSE").read_text(encoding="utf-8"),
     }
@@ -103,6 +107,8 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     for run, row, own_points in zip(shown, runs, points, strict=True):
         row["levels"] = {name: _packed(levels) for name, levels in fields.levels(run).items()}
         row["most"] = fields.most(run)
+        if (touched := fields.touched(run)) is not None and touched.any():
+            row["touched"] = _packed(touched.astype(np.uint8).tobytes())
         row["forces"] = arrows(run, comparison.setup, numbers)
         row["points"] = _positions(_last_finite(own_points), box)
     distance = [{"name": "distance", "signed": False, "top": top}] if len(shown) > 1 else []
@@ -114,6 +120,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
         "warm": _stops("plasma"),
         "quantities": distance + fields.quantities(),
         "force": _greatest_force(runs),
+        "attached": np.unique(comparison.setup.attached_vertices).tolist(),
         "bars": fields.bars(),
         "fibres": fields.fibres(points),
         "joints": joints(comparison.setup.bones, numbers),

@@ -5,6 +5,7 @@ runs        levels by quantity: (f, n) of one byte, as differences from the fram
             magnitude; points: of the fibres, as positions
 bars        by quantity and frame the error bar [mm] of the reference; null where it is unknown, absent without bars
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
+touched     of each run that touches a bone (f, n) of one byte: 1 within ``NEAR`` of a bone, but for attached vertices
 forces      of each run by frame the arrows: point of application [mm] and force on a bone [N], six numbers each
 joints      of each bone that moves its name, unit, and by frame the angle or the distance
 """
@@ -29,6 +30,7 @@ from fem_reference.report.at_frames import motions
 from fem_reference.runs.store import Run, at_numbers
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
+NEAR = 0.2  # [mm]: a vertex so near a bone touches it
 _LEVELS = 127
 # The statistic of the surface's deviation that is the greatest of a quantity.
 _BARS = {"distance": "max", "surface": "hausdorff"}
@@ -67,6 +69,19 @@ class Fields:
         return at_numbers(run, found, self.numbers)
 
     @cached_property
+    def gaps(self) -> dict[str, Floats | None]:
+        """Distances (f, n) [mm] to the bones by name of the run, NaN where a vertex is exempt; None where a bone has no inside."""
+        found = {run.name: (run, local_fields.to_bones(run, self.context)) for run in self.runs}
+        return {
+            name: None if gaps is None else at_numbers(run, gaps, self.numbers) for name, (run, gaps) in found.items()
+        }
+
+    def touched(self, run: Run) -> NDArray[np.bool_] | None:
+        """The vertices (f, n) that are within ``NEAR`` of a bone and not attached; None where that is not known."""
+        gaps = self.gaps[run.name]
+        return None if gaps is None else np.less_equal(gaps, NEAR)  # NaN is not
+
+    @cached_property
     def surfaces(self) -> dict[str, dict[str, Floats]]:
         """Values (f, n) [mm] by quantity and name of the run."""
         reference = self.runs[0]
@@ -74,8 +89,8 @@ class Fields:
         for run in self.runs:
             if run is not reference:
                 found["surface"][run.name] = at_numbers(run, local_fields.to_surface(run, reference), self.numbers)
-            if (gaps := local_fields.to_bones(run, self.context)) is not None:
-                found["depth"][run.name] = at_numbers(run, np.fmax(-gaps, 0), self.numbers)
+            if (gaps := self.gaps[run.name]) is not None:
+                found["depth"][run.name] = np.fmax(-gaps, 0)
         return {name: values for name, values in found.items() if values}
 
     def quantities(self) -> list[dict[str, Any]]:

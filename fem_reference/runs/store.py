@@ -10,7 +10,7 @@
                       /restart/        of an unfinished run: the state from which its solver continues (``writer``)
 """
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -91,8 +91,8 @@ class Run:
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
     [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines only moves no
     surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
-    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames of a run in memory; for a body they are the
-    whole run. ``body`` and ``settings``: the problem, where error bars of a body can be requested. ``residuals`` by frame.
+    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames in memory; for a body they are the whole run.
+    ``body``, ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: other muscles' runs by name.
     """
 
     name: str
@@ -113,6 +113,7 @@ class Run:
     body: Body | None = None
     settings: Record | None = None
     residuals: tuple[tuple[float, ...], ...] = ()
+    others: Mapping[str, "Run"] = field(default_factory=dict)
 
     @property
     def last(self) -> Frame:

@@ -1,16 +1,28 @@
 """Frames and runs of several muscles as those of one of them. Scalars of one muscle have its name before a dot."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem, Span
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Run
 
 # Scalars of all muscles together, which say nothing of one.
-_OF_ALL = ("volume_ratio", "energy", "force_", "moment_", "net_", "attachment_error_", "stress_", "load_")
+_OF_ALL = (
+    "volume_ratio",
+    "energy",
+    "force_",
+    "moment_",
+    "net_",
+    "attachment_error_",
+    "stress_",
+    "load_",
+    "touching_pressure of ",
+)
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
@@ -32,10 +44,15 @@ def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
     )
 
 
+def force_between(name: str, other: str) -> str:
+    """The name, among forces, of that of a muscle by ``name`` on an ``other``."""
+    return f"{called(name, 'free')} on {called(other, 'free')}"
+
+
 def _own(key: str, name: str, others: tuple[str, ...]) -> str:
     """The name that a force, by its ``key``, has for the muscle of a ``name``; empty where it is not on it."""
     for other in others:
-        if key == f"{other} free on {name} free":
+        if key == force_between(other, name):
             return other
     return key.removeprefix(f"{name} ") if key.startswith(f"{name} ") and not key.endswith(" free") else ""
 
@@ -44,6 +61,14 @@ def _state_of(state: NodalState, cells: slice) -> NodalState:
     """The state of some of the cells."""
     before = state.before[cells] if len(state.before) else state.before
     return replace(state, displacement=state.displacement[cells], pressure=state.pressure[cells], before=before)
+
+
+def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
+    """The ``runs`` of muscles by name, with the same frames, each with the others."""
+    return {
+        name: replace(run, others={other: one for other, one in runs.items() if other != name})
+        for name, run in runs.items()
+    }
 
 
 def run_of(run: Run, problem: MusclesProblem, name: str) -> Run:

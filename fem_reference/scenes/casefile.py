@@ -261,5 +261,6 @@ def _check_muscles(case: MusclesCase) -> None:
             want = "contact among the effects of the case, as it acts on all muscles"
             raise InputError(join(case.place, f"muscle[{i}].effect"), "contact of one muscle", want)
         part = case.parts[i]
-        _check_effects([name_of(one) for one in part.effect], part.effect, part.place)
-        _checked(part)
+        with case.placed(i):
+            _check_effects([name_of(one) for one in part.effect], part.effect, part.place)
+            _checked(part)

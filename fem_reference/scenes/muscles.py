@@ -1,6 +1,8 @@
 """The case of several muscles, which share bones, frames and a reference, as frozen records; and each of them as a case."""
 
+import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Literal, Self
 
 from pydantic import Field
@@ -56,6 +58,11 @@ class MusclesCase(Case):
         return among(self.effect)
 
     @property
+    def apart(self) -> bool:
+        """True where muscles must not cross: contact acts between them, or was left out as they do not come near."""
+        return any(isinstance(one, MuscleContact) for one in (*self.effect, *(some.effect for some in self.decisions)))
+
+    @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects of all muscles, then those of each."""
         return (*self.effect, *(one for muscle in self.muscle for one in muscle.effect))
@@ -76,11 +83,13 @@ class MusclesCase(Case):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine its solution, without what is expected of it."""
+        """The keys that determine its solution, without what is expected of it; and that its second check asks whether muscles
+        cross, where no effect says it.
+        """
         tables = super().determining()
-        return tables | {
-            "muscle": [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
-        }
+        checked = {"apart": True} if self.apart and self.touching is None else {}
+        own = [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
+        return tables | checked | {"muscle": own}
 
     @property
     def decides(self) -> list[Any]:
@@ -92,6 +101,31 @@ class MusclesCase(Case):
         """The case that expects ``more`` of each muscle."""
         muscles = (one.model_copy(update={"expect": (*one.expect, *more)}) for one in self.muscle)
         return self.model_copy(update={"muscle": tuple(muscles)})
+
+    @contextmanager
+    def placed(self, i: int) -> Iterator[None]:
+        """Give the place in the scene to InputErrors of the muscle of number ``i`` as a case."""
+        try:
+            yield
+        except InputError as error:
+            part = join(self.place, f"muscle[{i}]")
+            if not str(error.place).startswith(f"{part}."):
+                raise
+            key = self._key(i, str(error.place).removeprefix(f"{part}."))
+            raise InputError(join(self.place, key), error.got, error.want) from error
+
+    def _key(self, i: int, key: str) -> str:
+        """The ``key`` of the muscle of number ``i`` as a case, as that of the scene: effects of all come before its own."""
+        own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
+        shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
+        if match := re.match(r"effect\[(\d+)\]", key):
+            number = int(match[1])
+            rest = key[match.end() :]
+            of_all = number < len(shared)
+            return f"effect[{shared[number]}]{rest}" if of_all else f"{own}effect[{number - len(shared)}]{rest}"
+        if name == "muscle":
+            return own + key.removeprefix("muscle.")
+        return own + key if name in BESIDE or name == "effect" else key
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:

@@ -11,7 +11,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Run, complete
-from fem_reference.runs.views import run_of
+from fem_reference.runs.views import beside, run_of
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
@@ -50,19 +50,22 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
     Frames are read from folders with the names of the muscles; a candidate may lack some.
     """
     parts, found = bench.parts, dict[str, Comparison]()
+    chosen = [(bench.found(*one), one[1]) for one in chosen]
     own = {name: [_own(one, name) for one in chosen] for name in parts}
     for i, (entry, place) in enumerate(chosen):
         if all(given[i] is None for given in own.values()):
             want = f"folders {' or '.join(parts)} in it, with the frames of these muscles"
             raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
-    reference = bench.reference()
-    whole = views(bench, reference)
-    runs: dict[str, dict[str, Run]] = {"reference": whole}
+    reference, numbers = bench.reference(), bench.scene.numbers
+    runs = {"reference": {name: complete(run, numbers) for name, run in views(bench, reference).items()}}
     for name, part in parts.items():
-        solved = [part.obtain(entry.name, entry, place) for entry, place in filter(None, own[name])]
-        for run in solved:
-            runs.setdefault(run.name, {})[name] = complete(run, part.scene.numbers)
-        found[name] = judging.compare(part, whole[name], solved)
+        for entry, place in filter(None, own[name]):
+            run = part.obtain(entry.name, entry, place)
+            runs.setdefault(run.name, {})[name] = complete(run, numbers)
+    runs = {who: beside(some) for who, some in runs.items()}
+    for name, part in parts.items():
+        solved = [some[name] for some in runs.values() if name in some]
+        found[name] = judging.compare(part, solved[0], solved[1:])
     lacking = tuple((entry.name, name) for i, (entry, _) in enumerate(chosen) for name in parts if own[name][i] is None)
     return ByMuscle(found, tuple(_worst(runs)), lacking)
 

@@ -76,11 +76,16 @@ class Bench[C: Case]:
         casefile.muscle(self.scene)
         return cast("Bench[MuscleCase]", self)
 
-    def settings(self, choice: SolverChoice, place: str) -> Record:
-        """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
+    def found[S: SolverChoice](self, choice: S, place: str) -> S:
+        """The ``choice`` with its folder, if any, as a path: one that the scene names is found as its files are, and only there."""
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
-        if isinstance(folder, str) and (named or not Path(folder).is_absolute()):
-            choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
+        if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
+            return choice
+        return choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
+
+    def settings(self, choice: SolverChoice, place: str) -> Record:
+        """The settings of ``choice``, checked."""
+        choice = self.found(choice, place)
         where, task = join(self.scene.place, place), self.scene.task
         settings = solvers.settings(choice, where, task)
         if self.ranks is not None and choice.solver == "fenicsx" and "ranks" in type(settings).model_fields:
@@ -106,6 +111,7 @@ class Bench[C: Case]:
         ``chosen`` solvers do not suit the case. The problem made of the case is checked only when it is solved.
         """
         if self.scene.parts:
+            self.settings(self.scene.reference, "reference")
             for part in self.parts.values():
                 part.check([one for one in chosen if one[0].solver != "recorded"])
             return

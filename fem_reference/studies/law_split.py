@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fem_reference.effects import Effect, make, moduli, name_of
+from fem_reference.effects import Effect, make, moduli, name_of, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
@@ -29,8 +29,12 @@ class Split:
 
 
 def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
-    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``."""
+    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``; InputError
+    where it has no such law, or laws of regions.
+    """
     found = moduli(case.effects)
+    if regions_named(case.effects) or not min(found.shear, found.bulk) > 0:
+        raise InputError(case.place, "laws of regions, or no shear or bulk modulus", "one law of the whole muscle")
     mu, bulk = found.shear, found.bulk
     ratio = min((3 * bulk - 2 * mu) / (2 * (3 * bulk + mu)), poisson)
     return mu, 2 * mu * ratio / (1 - 2 * ratio)

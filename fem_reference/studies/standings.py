@@ -101,14 +101,16 @@ def _on(
     missing: dict[str, str],
 ) -> Iterator[Standing]:
     case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
-    measured = _Measured(bench, reference, context_of(bench.setup(), reference))
+    measured = _Measured(bench, reference, context_of(bench.setup(), reference), missing)
+    truth = Candidate(name="reference", **case.reference.model_dump())
     ours = [Entrant(one, kind) for kind, one, _ in table_5_1.chosen(case, solver_kinds())]
-    yield measured.row(
-        Entrant(Candidate(name="reference", **case.reference.model_dump()), table_5_1.REFERENCE), reference
-    )
+    taken = {truth.name, *(one.candidate.name for one in ours)}
+    yield measured.row(Entrant(truth, table_5_1.REFERENCE), reference)
     for one in (*ours, *(one for one in entrants if one.case in ("", case.name))):
         name = one.candidate.name
         try:
+            if name in taken and one not in ours:
+                raise InputError(name, "the name of a solver of ours", "another name")
             key = measured.key(one)
             old = known.get(name)
             if old is not None:
@@ -129,6 +131,7 @@ class _Measured:
     bench: Bench[MuscleCase]
     reference: Run
     context: MeasurementContext
+    missing: dict[str, str]
 
     @property
     def truth(self) -> str:
@@ -146,7 +149,7 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run) -> Standing:
-        own = one.group == table_5_1.REFERENCE
+        own = run is self.reference
         worst = {} if own else cost.greatest(run, self.reference, self.context, in_tables())
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
         least = standings.matched([*self._studied(one), _point(run, one, worst, seconds)])
@@ -173,19 +176,21 @@ class _Measured:
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:
-        """The parts of the error of a solver that states its law; none of one that reached no frame, and without a law."""
+        """The parts of the error of a solver that states its law and reached all frames, where the references in between do."""
         if one.law is None or run.outcome.status != "converged":
             return {}
-        law = law_split.law_of(one.law, self.bench.scene, float(one.candidate.settings["poisson"]))
-        return law_split.split(self.bench, run, law, one.takes).parts
+        try:
+            law = law_split.law_of(one.law, self.bench.scene, float(one.candidate.settings["poisson"]))
+            return law_split.split(self.bench, run, law, one.takes).parts
+        except InputError as error:
+            self.missing[f"{self.bench.scene.name}, parts of the error of {run.name}"] = str(error)
+            return {}
 
     def _studied(self, one: Entrant) -> list[Point]:
-        """The points of a stored study of an entrant on this case, against this truth."""
+        """The points of stored studies of an entrant on this case, against this truth."""
         found = [study for path in self.bench.store.parent.glob(f"*/{cost.FILE}") for study in load(path)]
-        mine = (one.candidate.name, one.candidate.solver)
-        return [
-            p for study in found if study.truth_key == self.truth for p in study.points if {p.name, p.solver} & {*mine}
-        ]
+        points = [point for study in found if study.truth_key == self.truth for point in study.points]
+        return [point for point in points if point.name == one.candidate.name]
 
 
 def _point(run: Run, one: Entrant, worst: dict[str, float], seconds: float | None) -> Point:

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.assessment.neighbours import depths
+from fem_reference.assessment.neighbours import between, depths
+from fem_reference.effects.touching import MuscleContact
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.problems.touching import pressure_name
 from fem_reference.runs.store import Outcome, Run
 
 
@@ -18,3 +23,34 @@ def test_depths_of_two_cubes_by_frame() -> None:
     ((one, other, found),) = depths({"still": still, "moved": moved})
     assert (one, other) == ("still", "moved")
     assert found == pytest.approx([0.0, 0.1, np.nan], nan_ok=True)
+
+
+def test_muscles_may_overlap_by_the_give_of_their_own_contact_alone() -> None:
+    """Three cubes of 1 mm, whose edges and diagonals are 0.5 to 0.87 mm, over one another: "b" is 0.1 mm in "a", and "c" apart."""
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0))
+    lines = Polylines(np.array([[0.5, 0.5, 0.1], [0.5, 0.5, 0.9]]), np.array([0, 2]))
+    cube = MuscleProblem(shapes.skin(mesh), (), (), (0, 1), None, mesh=mesh, effects=(), fibres=lines)
+    law = MuscleContact(stiffness="1 MPa/mm", smoothing="0.01 mm")
+    problem = MusclesProblem(dict.fromkeys("abc", cube), (), law, apart=True)
+    count = len(mesh.points)
+    lifts = np.repeat([0.0, 0.9, 2.5], count)[:, None] * [0.0, 0.0, 1.0]
+    nodes = np.tile(mesh.points, (3, 1)) + lifts
+
+    def denied(pressed: str, pressure: float, places: np.ndarray | None = nodes) -> list[str]:
+        """What is not met under a ``pressure`` [MPa] between two muscles."""
+        names = ("touching_pressure", pressure_name(*(f"{one} free" for one in pressed)))
+        run = Run(
+            "reference",
+            "fenicsx",
+            Outcome("converged", ""),
+            (0,),
+            cube.surface,
+            cube.surface.points[None],
+            scalars={name: np.array([pressure]) for name in names},
+        )
+        return [one.name for one in between(problem, run, lambda _: places) if not one.met]
+
+    assert denied("ab", 0.09) == []  # 0.09 and 0.01, and 0.05 of an edge that bulges
+    assert denied("ab", 0.02) == ["a and b in each other"]  # at most 0.073
+    assert denied("bc", 0.09) == ["a and b in each other"]  # others that press each other are no excuse
+    assert len(denied("ab", 0.09, None)) == 3  # not known, so that none is met

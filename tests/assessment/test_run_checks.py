@@ -269,7 +269,7 @@ def test_parts_that_touch_overlap_by_the_give_of_contact() -> None:
 
     def wrong(depth: float, pressure: float, body: Body = body) -> list[tuple[str, float]]:
         """What is not met where the upper box is ``depth`` in the lower one in the middle frame."""
-        scalars = {"touching_pressure": pressure}
+        scalars = {law.pressure_name: pressure, "touching_pressure": 9.0}  # of other parts, too
         places = [mesh.points, mesh.points - upper * [0.0, 0.0, depth], mesh.points]
         frames = [Frame(float(i), points=at, scalars=scalars) for i, at in enumerate(places)]
         return [(check.name, check.frame) for check in of_body(body, collected(frames, CONVERGED)) if not check.met]

@@ -1,7 +1,9 @@
 """The built wheel: it carries cases, meshes and truths, and works where no checkout is near."""
 
+import re
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -21,6 +23,22 @@ def installed(tmp_path_factory) -> Path:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site")
     return folder / "site"
+
+
+def test_the_source_distribution_has_what_its_documentation_shows(tmp_path) -> None:
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as opened:
+        names = {name.partition("/")[2] for name in opened.getnames()}
+    shown = {
+        (path.parent / link).resolve().relative_to(ROOT).as_posix()
+        for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+        for link in re.findall(r"!\[[^\]]*\]\(([^):]+)\)", path.read_text(encoding="utf-8"))
+    }
+    assert "reports/hip_flexion.png" in shown
+    assert shown <= names
+    assert {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs" / "measured").iterdir()} <= names
 
 
 def call(installed: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:

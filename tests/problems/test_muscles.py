@@ -75,6 +75,34 @@ def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
         assert 5 - 2 * slide - 1 < gap < 5 - 2 * slide
 
 
+def test_a_run_whose_muscles_must_not_cross_is_another_one(folder: Path) -> None:
+    """Contact that "auto" leaves out is in no equation, and yet muscles are checked: nothing unchecked is taken up for it."""
+    without = of_case.chosen(case_of(folder, effects="auto", slide=1))
+    plain = case_of(folder, slide=1)
+    assert without.touching is None
+    assert without.apart
+    shared = tuple(one for one in plain.effect if one is not plain.touching)
+    never = plain.model_copy(update={"effect": shared})
+    same = without.model_copy(update={"muscle": never.muscle})  # auto leaves out the viscosity too
+    assert not never.apart
+    assert same.model_copy(update={"decisions": ()}).key == never.key
+    assert same.key != never.key
+
+
+def test_loads_and_bones_that_press_bring_muscles_nearer(folder: Path) -> None:
+    """Muscles that the lid alone keeps 3 mm apart may touch where a load bends them, or where a bone that rests is in their way."""
+    gravity = '[[effect]]\nname = "gravity"\ndensity = "1060 kg/m3"\nacceleration = "9.81, 0, 0 m/s^2"\nramp = []\n'
+    gravity = gravity.replace("ramp = []", "ramp = [{ frame = 0, amount = 0.0 }, { frame = 2, amount = 1.0 }]")
+    wall = '[[bone]]\nname = "wall"\nbox = { centre = "-6, 5, 10 mm", size = "10, 10, 10 mm" }\n'
+    contact = '[[effect]]\nname = "contact"\nstiffness = "1 MPa/mm"\nsmoothing = "0.1 mm"\nbones = ["wall"]\n'
+    pushed = text(slide=-2).replace("[frames]", f"{wall}{contact}[frames]")
+    near = {}
+    for name, scene in (("alone", text(slide=-2)), ("load", f"{text(slide=1)}{gravity}"), ("pulley", pushed)):
+        (folder / "case.toml").write_text(scene, encoding="utf-8")
+        near[name] = of_case.setup(casefile.read(folder)).pairs
+    assert near == {"alone": (), "load": (("a", "b"),), "pulley": (("a", "b"),)}
+
+
 def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
     case = case_of(folder)
     problem = of_case.problem(case, of_case.setup(case))
@@ -124,3 +152,30 @@ def test_a_motion_there_and_back_between_frames_counts(folder: Path) -> None:
     still = of_case.setup(casefile.read(folder))
     far, near = (muscles.clearance(*one.muscles.values()) for one in (still, rest))
     assert far - near == pytest.approx(6.0, abs=1e-9)  # each may come nearer by 3 mm
+
+
+@pytest.mark.slow
+def test_a_load_on_one_muscle_is_carried_by_bones_and_by_the_other_muscle(folder: Path, tmp_path: Path) -> None:
+    """Bars 0.35 mm apart, of which the weight of one (0.2 N, ten times that of tissue) presses it onto the other: the second
+    check knows the push, as the load of each is what bones and the other carry, to what Newton's method leaves.
+    """
+    other = files.read_surface(folder / "b.vtp", 1.0)
+    files.write_surface(folder / "b.vtp", other, other.points - [4.65, 0, 0])
+    gravity = (
+        '[[muscle.effect]]\nname = "gravity"\ndensity = "1e4 kg/m3"\nacceleration = "9.81, 0, 0 m/s^2"\n'
+        "ramp = [{ frame = 0, amount = 0.0 }, { frame = 2, amount = 1.0 }]\n"
+    )
+    scene = text(slide=0).replace('[[muscle]]\nname = "b"', f'{gravity}[[muscle]]\nname = "b"')
+    scene = (
+        scene.replace('10 mm"\nmesher', '5 mm"\nmesher')
+        .replace("1 MPa/mm", "100 kPa/mm")
+        .replace('0.1 mm"\n[fr', '0.3 mm"\n[fr')
+    )
+    (folder / "case.toml").write_text(scene, encoding="utf-8")
+    run = Bench(casefile.read(folder), tmp_path / "runs").reference()
+    assert run.outcome.status == "converged"
+    push, weight = run.scalars["a.force_on_b_x"][-1], 1e-8 * 9810 * 2000
+    assert 0.05 * weight < push < weight
+    assert run.scalars["b.force_on_a_x"][-1] == pytest.approx(-push, rel=1e-9)
+    carried = push + sum(run.scalars[f"a.force_on_{bone}_x"][-1] for bone in BOXES)
+    assert carried == pytest.approx(weight, abs=1e-6)

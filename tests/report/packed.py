@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.problems.setup import AttachedVertices
 from tests.report.comparisons import NAN, NUMBERS
 
 
@@ -42,3 +43,11 @@ def with_bars(comparison, bar: float):
         for statistic, share in (("max", 1.0), ("hausdorff", 0.5))
     ]
     return replace(comparison, error_bars=ErrorBars(NUMBERS, (1.0, 2.0), 1.0, tuple(known)))
+
+
+def acted_on(comparison):
+    """The comparison with three vertices attached to its bone, which the body may touch."""
+    setup = comparison.setup
+    attached = AttachedVertices("foot", setup.bones[0], np.array([5, 3, 8]))
+    context = replace(comparison.context, bones=setup.bones)
+    return replace(comparison, setup=replace(setup, attached=(attached,)), context=context)

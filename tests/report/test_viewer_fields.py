@@ -9,7 +9,7 @@ import pytest
 from fem_reference.assessment import local_fields
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.report import viewer, viewer_fields
-from tests.report.packed import levels, positions, with_bars
+from tests.report.packed import acted_on, levels, positions, unpacked, with_bars
 
 pytestmark = pytest.mark.slow
 
@@ -37,6 +37,21 @@ def test_signed_distances_and_depths_are_those_of_the_runs(comparison):
         deep = np.where(context.exempt.vertices, 0, np.maximum(deep, 0))
         assert (np.abs(levels(data, i, "depth", 5) - deep) <= 0.02 * deep.max() + 1e-9).all()
         assert data["runs"][i]["most"]["depth"] == pytest.approx(deep.max(axis=1), rel=1e-3)
+
+
+def test_vertices_near_a_bone_and_attached_ones_are_marked(comparison, monkeypatch):
+    """By the distances of the bone itself, where 10 mm are near; none that is exempt, as attached ones are."""
+    monkeypatch.setattr(viewer_fields, "NEAR", 10.0)
+    changed = acted_on(comparison)
+    body, free = changed.setup.bones[0], ~changed.context.exempt.vertices
+    data = json.loads(viewer.view(changed)["data"])
+    assert data["attached"] == [3, 5, 8]
+    for i, run in enumerate((comparison.reference, comparison.candidates[0])):
+        far = np.stack([body.distances(number, at) for number, at in zip(run.numbers, run.positions, strict=True)])
+        near = free & (far <= 10)
+        assert near.any()
+        np.testing.assert_array_equal(unpacked(data["runs"][i]["touched"], "u1").reshape(near.shape), near)
+    assert "touched" not in json.loads(viewer.view(comparison)["data"])["runs"][0]  # without a bone in contact
 
 
 def test_fibres_and_joints_are_those_of_the_case(comparison):

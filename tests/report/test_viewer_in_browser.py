@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from browser import PROGRAM, Browser
 
-from fem_reference.report import comparison_page, viewer
+from fem_reference.report import comparison_page, viewer, viewer_fields
 from tests.report.comparisons import NUMBERS, alone, html
-from tests.report.packed import with_bars
+from tests.report.packed import acted_on, with_bars
 
 pytestmark = pytest.mark.slow
 UP = "!document.getElementById('viewer').hidden"
@@ -184,6 +184,25 @@ def test_fibres_show_through_and_paper_and_dark_are_followed(opened):
 def grey(picture: np.ndarray) -> int:
     """How many pixels have neither colour nor are they white."""
     return int(((np.ptp(picture, axis=2) < 12) & (picture.max(axis=2) < 220)).sum())
+
+
+def pink(picture: np.ndarray) -> int:
+    """How many pixels have the colour of attached vertices."""
+    return int((np.abs(picture - [0xE0, 0x21, 0x8A]).max(axis=2) < 30).sum())
+
+
+def test_attached_and_touched_vertices_are_seen_until_they_are_hidden(browser, comparison, tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer_fields, "NEAR", 30.0)  # all of them
+    show(browser, acted_on(comparison), tmp_path, "#frame=40")
+    click(browser, "bones")
+    seen = browser.picture("#viewer-stage")
+    click(browser, "touched")
+    without = browser.picture("#viewer-stage")
+    assert pink(without) > 20
+    assert (np.abs(seen - without).max(axis=2) > 60).sum() > 20
+    click(browser, "attached")
+    assert pink(browser.picture("#viewer-stage")) == 0
+    assert browser.complaints() == []
 
 
 def test_panes_are_those_chosen_and_the_reference_can_lie_over_them(opened):

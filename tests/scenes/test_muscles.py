@@ -11,6 +11,10 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.muscles import MusclesCase
 from tests.scenes.bars import SCENE, written
 
+RAMPED = (
+    '[[effect]]\nname = "gravity"\ndensity = "1060 kg/m3"\nacceleration = "0, 0, -9.81 m/s^2"\n'
+    "ramp = [{ frame = 0, amount = 1.0 }, { frame = 1, amount = 1.0 }]\n\n"
+)
 BESIDE = ("attachment", "fibres", "effect", "expect")
 OWN = SCENE[SCENE.index("[muscle]") : SCENE.index("[[bone]]")]
 ATTACHED = SCENE[SCENE.index("[[attachment]]") : SCENE.index("[[effect]]")]
@@ -89,6 +93,11 @@ def test_the_key_changes_with_each_muscle_and_not_with_what_is_expected(bar: Pat
             r"muscle\[1\]\.tet_sise: got an unknown key",
         ),
         (several(nested("a"), nested("b")) + EXPECTED, r"expect: got expectations of all muscles"),
+        (
+            several(nested("a"), nested("b", RAMPED.replace("[[", "[[muscle."))),
+            r"toml: muscle\[1\]\.effect\[0\]\.ramp: got an amount of 1",
+        ),
+        (several(nested("a"), nested("b")) + RAMPED, r"toml: effect\[2\]\.ramp: got an amount of 1"),
         (several(nested("a")) + ATTACHED, r"attachment: got it, and muscle\[0\]\.attachment"),
     ],
 )

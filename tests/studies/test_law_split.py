@@ -25,6 +25,12 @@ def test_lames_parameters_are_those_of_the_matrix(bench) -> None:
     # mu = 10 kPa and K = 2 mu (1 + nu) / (3 (1 - 2 nu)) of nu = 0.45; less where a solver has a smaller ratio.
     assert law_split.lame(bench.scene, 0.49) == pytest.approx((0.01, 0.09))
     assert law_split.lame(bench.scene, 0.3) == pytest.approx((0.01, 0.015))
+    for effects in (
+        (fr.make_effect("neo_hooke", mu=0.01),),
+        (fr.make_effect("neo_hooke", mu=0.01, **{"in": "fat"}), *bench.scene.effect),
+    ):
+        with pytest.raises(InputError, match="want one law of the whole muscle"):
+            law_split.lame(bench.scene.model_copy(update={"effect": effects}), 0.45)
 
 
 def test_each_part_is_found_where_it_was_put(bench) -> None:

@@ -104,6 +104,19 @@ def test_everybody_stands_with_provenance_and_what_holds_is_kept(monkeypatch) ->
     assert anew["rows"][1]["run"] != first["rows"][1]["run"]
 
 
+def test_a_submission_is_never_the_reference_whatever_it_says(place) -> None:
+    submit(place / "mine", group="FEM")
+    rows = stand("--submission", "mine")["rows"]
+    assert [(row["group"], row["name"], ERROR in row["worst"]) for row in rows] == [
+        ("FEM", "reference", False),
+        ("FEM", "mine", True),
+    ]
+    submit(place / "mine", name="reference")
+    found = stand("--submission", "mine")
+    assert [row["name"] for row in found["rows"]] == ["reference"]
+    assert "the name of a solver of ours" in found["missing"]["bar, reference"]
+
+
 def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) -> None:
     def refused(want: str) -> None:
         assert cli.main(["standings", "./bar", "--submission", "mine"]) == cli.BAD_INPUT

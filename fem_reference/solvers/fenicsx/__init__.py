@@ -14,6 +14,7 @@ import numpy as np
 
 from fem_reference.effects import Effect
 from fem_reference.effects.in_situ import among
+from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
@@ -29,7 +30,7 @@ from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.runs.stress_statistics import stress_scalars
-from fem_reference.runs.views import frame_of
+from fem_reference.runs.views import force_between, frame_of
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
@@ -54,6 +55,8 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
     """Raise InputError below ``place`` unless the element suits tetrahedra and effects, and the ranks suit the linear solver."""
+    if any(isinstance(one, MuscleContact) for one in effects):
+        _check_touching(settings, place)
     _check_ranks(settings, join(place, "ranks"))
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
@@ -119,11 +122,22 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
             others = tuple(name for name in names if name != span.name)
             one = each[span.name](frame_of(frame, span, others), is_first=is_first)
             new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
+            for other in others:
+                new |= _on_other(frame, span.name, other)
             own |= {f"{span.name}.{key}": value for key, value in new.items()}
             note = one.note
         return replace(frame, note=note, scalars=frame.scalars | own)
 
     return describe
+
+
+def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
+    """The components of the force and the moment of a muscle by ``name`` on an ``other``, where these may touch."""
+    found, key = dict[str, float](), force_between(name, other)
+    for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
+        if key in vectors:
+            found |= vector_scalars(f"{kind}_on_{other}", vectors[key])
+    return found
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
@@ -223,13 +237,8 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings with open ones filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
-    if isinstance(problem, MusclesProblem) or problem.body.touching:
-        if (settings.ranks or 1) > 1:
-            raise InputError(
-                "ranks", settings.ranks, "1, on which several muscles, or one that touches itself, are solved"
-            )
-        if settings.linear_solver == "multigrid":
-            raise InputError("linear_solver", '"multigrid"', "another: its levels know no muscles that touch")
+    if isinstance(problem, MusclesProblem) or problem.body.touching:  # parts of contact with bones are of one rank, too
+        _check_touching(settings, "reference")
         settings = settings.model_copy(update={"ranks": 1})
     chosen = resources.planned(settings, mesh, resources.available())
     _check_ranks(chosen, "ranks")
@@ -245,6 +254,15 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
 def _has_steps(problem: AnyMuscle) -> bool:
     """True where an effect depends on velocities."""
     return any("interval" in effect.needs for effect in problem.body.effects)
+
+
+def _check_touching(settings: Settings, place: str) -> None:
+    """Raise InputError below ``place`` where the settings do not suit muscles that touch."""
+    if (settings.ranks or 1) > 1:
+        want = "1, on which several muscles, or one that touches itself, are solved"
+        raise InputError(join(place, "ranks"), settings.ranks, want)
+    if settings.linear_solver == "multigrid":
+        raise InputError(join(place, "linear_solver"), '"multigrid"', "another: its levels know no muscles that touch")
 
 
 def _check_ranks(settings: Settings, place: str) -> None:

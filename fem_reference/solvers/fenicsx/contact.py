@@ -180,20 +180,21 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point; the rest area in contact,
-        ``contact_area`` [mm2], and its number of ``contact_points``; the number of distance queries, ``contact_points_near``; and
-        the depth at rest of the deepest point in contact, ``overlap_at_rest`` [mm], where it is removed or, in situ, stays. With
-        friction its dissipated work since the start, ``friction_work`` [N mm].
+        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, ``PART.contact_pressure`` in parts;
+        the rest area in contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, queries of distances;
+        ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
         """
-        comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
-        depth = pressure = 0.0
+        comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
             touched[one.pressed] = True
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
         greatest = {"contact_depth": depth, "contact_pressure": pressure}
-        kept = self.law.in_situ is not None
-        greatest |= {"overlap_at_rest": self.overlap} if self.law.relaxed or kept else {}
+        for part, first, last in self.law.parts:
+            own = [one.pressure[(one.pressed >= first) & (one.pressed < last)] for one in self.now]
+            greatest[f"{part}.contact_pressure"] = float(np.concatenate(own).max(initial=0.0))
+        if self.law.relaxed or self.law.in_situ is not None:
+            greatest["overlap_at_rest"] = self.overlap
         sums = {
             "contact_area": float(self.points.areas[touched].sum()),
             "contact_points": float(touched.sum()),

@@ -114,11 +114,9 @@ def test_at_rest_no_body_feels_itself_however_thin_it_becomes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
-def test_arms_that_close_do_not_cross_and_forces_balance(element, fem_lab) -> None:
-    mesh = letter_c("tetrahedron" if element[0] == "P" else "hexahedron")
-    settings = {"first_step": 0.25, "residual": 1e-10}
-    run, crossed = (fem_lab.solve(closing(mesh, law), element, **settings).last for law in (ITSELF, None))
+def test_arms_that_close_do_not_cross_and_forces_balance(fem_lab) -> None:
+    mesh, settings = letter_c("hexahedron"), {"first_step": 0.25, "residual": 1e-10}
+    run, crossed = (fem_lab.solve(closing(mesh, law), "Q1/P0", **settings).last for law in (ITSELF, None))
     assert overlap_at(mesh, ITSELF, crossed.points) > 0.01
     assert overlap_at(mesh, ITSELF, run.points) <= 0
     assert run.scalars["touching_points"] > 30
@@ -150,7 +148,7 @@ def folded() -> MuscleProblem:
         "title": "a strip",
         "healthy": "it does not cross itself",
         "bound": [{"quantity": "volume", "at_most": 5}],
-        "block": {"size": "60, 6, 4 mm", "cells": [16, 1, 1]},
+        "block": {"size": "60, 6, 4 mm", "cells": [10, 1, 1]},
         "hold": [{"face": "x0"}, {"face": "x1", "motion": turn}],
         "frames": {"first": 0, "last": 20, "every": 5},
     }
@@ -164,11 +162,10 @@ def test_a_muscle_does_not_cross_itself_in_silence() -> None:
     problem, frames = folded(), []
     with pytest.raises(InputError, match="ranks: got 2, want 1, on which several muscles, or one that touches itself"):
         fenicsx.solve(problem, fenicsx.Settings(ranks=2), frames.append)
-    outcome = fenicsx.solve(problem, fenicsx.Settings(first_step=2.0, smallest_step=0.5), frames.append)
+    outcome = fenicsx.solve(problem, fenicsx.Settings(first_step=5.0, smallest_step=1.0), frames.append)
     assert [frame.number for frame in frames] == [0, 5, 10, 15]
     assert outcome.status == "diverged"
-    assert "contact gives way (free on free)" in outcome.message
     free, crossing = replace(problem, effects=blocks.MATERIAL), []
-    assert fenicsx.solve(free, fenicsx.Settings(first_step=2.0), crossing.append).status == "converged"
+    assert fenicsx.solve(free, fenicsx.Settings(first_step=5.0), crossing.append).status == "converged"
     assert len(self_crossings(problem.surface.moved_to(crossing[-1].surface)))
     assert not len(self_crossings(problem.surface.moved_to(frames[-1].surface)))

@@ -1,0 +1,101 @@
+"""Several muscles as one input file of FEBio: the model of each, with bones of its own, and contact between them."""
+
+from xml.etree.ElementTree import Element
+
+from fem_reference.export import febio, febio_contact, febio_mesh
+from fem_reference.problems.muscles import MusclesProblem
+
+# What names something, and what refers to it: attributes, and tags of texts.
+_ATTRIBUTES = ("name", "mat", "node_set", "elem_set", "surface_pair")
+_TEXTS = ("primary", "secondary", "rb")
+# Entries that are numbered over all muscles, and those whose text is numbers of nodes.
+_NUMBERED = {"node": "node", "elem": "elem", "material": "material", "load_controller": "curve"}
+_OF_NODES = ("elem", "tri3", "tri6", "NodeSet")
+_ONCE = ("Module", "Control")  # sections that are the same for all
+_ORDER = (*_ONCE, "Material", "Mesh", "MeshDomains", "MeshData", "Boundary", "Rigid", "Contact", "LoadData", "Output")
+_FIRST = ("Nodes", "Elements")  # of a mesh
+
+
+def model(problem: MusclesProblem) -> Element:
+    """The whole input file: names of a muscle have its own before them, as ``deep_muscle``."""
+    root = Element("febio_spec", version="4.0")
+    sections = {tag: Element(tag) for tag in _ORDER}
+    before = dict.fromkeys(_NUMBERED.values(), 0)
+    for name, one in problem.problems.items():
+        own = febio.model(one)
+        mesh = febio_mesh.Mesh(one)
+        mesh.surface(_found(own, "Mesh"), "touching", "tri6", mesh.curved(one.body.mesh.facets["free"]))
+        _renamed(own, name, before)
+        for section in own:
+            if section.tag in sections:
+                _add(sections[section.tag], section)
+            else:  # a comment, on this muscle
+                root.append(section)
+    _touch(sections, problem)
+    sections["Mesh"][:] = sorted(sections["Mesh"], key=lambda one: one.tag not in _FIRST)
+    root.extend(one for one in sections.values() if len(one) or one.attrib)
+    return root
+
+
+def _found(root: Element, tag: str) -> Element:
+    """The entry with a ``tag``, which is there."""
+    found = root.find(tag)
+    assert found is not None
+    return found
+
+
+def _add(known: Element, more: Element) -> None:
+    """Add the entries of a section of another muscle: of output what is logged alone."""
+    if known.tag in _ONCE and (len(known) or known.attrib):
+        return
+    known.attrib |= more.attrib
+    if known.tag == "Output" and len(known):
+        _found(known, "logfile").extend(_found(more, "logfile"))
+    else:
+        known.extend(more)
+
+
+def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
+    """Put the ``name`` of a muscle before all names, and count its numbers from those ``before``, which are counted on."""
+    most = dict(before)
+    for entry in root.iter():
+        for key in set(_ATTRIBUTES) & set(entry.keys()):
+            entry.set(key, f"{name}_{entry.get(key)}")
+        if entry.tag in _TEXTS:
+            entry.text = f"{name}_{entry.text}"
+        if entry.tag in _OF_NODES:
+            entry.text = ",".join(str(int(node) + before["node"]) for node in str(entry.text).split(","))
+        if entry.tag in _NUMBERED:
+            kind = _NUMBERED[entry.tag]
+            number = int(entry.get("id", "")) + before[kind]
+            most[kind] = max(most[kind], number)
+            entry.set("id", str(number))
+        if curve := entry.get("lc"):
+            entry.set("lc", str(int(curve) + before["curve"]))
+        if entry.tag == "node_data":
+            entry.set("file", f"nodes_{name}.txt")
+    before |= most
+
+
+def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
+    """Contact of each two muscles that may touch: in two passes, each with half the stiffness, as both sides have half in the
+    reference.
+    """
+    if not problem.pairs:
+        return
+    assert problem.law is not None  # or no two may touch
+    for one, other in problem.pairs:
+        name = f"{one}_{other}"
+        febio_mesh.Mesh.pair(sections["Mesh"], f"{name}_pair", f"{one}_touching", f"{other}_touching")
+        settings = {"penalty": problem.law.stiffness / 2, "search_radius": febio_contact.SEARCH_RADIUS, "two_pass": 1}
+        febio_contact.pair(sections["Contact"], "sliding-elastic", name, settings)
+    solver = _found(sections["Control"], "solver")
+    if solver.find("symmetric_stiffness") is None:
+        febio_mesh.leaf(solver, "symmetric_stiffness", "non-symmetric")
+
+
+def notes(problem: MusclesProblem) -> list[str]:
+    """Differences of the model in FEBio, by muscle, and of the contact between muscles."""
+    own = [f"{name}: {text}" for name, one in problem.problems.items() for text in febio_contact.notes(one)]
+    law = "linear from the surface on, without smoothing; an overlap at rest is removed at once"
+    return own + [f"{one} and {other} touch by FEBio's law: {law}" for one, other in problem.pairs]

@@ -1,0 +1,46 @@
+"""Depth of a run's muscle inside the other muscles of the same run; of the run alone, independent of the reference."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from fem_reference.foundations.mesh import place_of
+from fem_reference.geometry.interpenetration import penetration
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.runs.store import Run
+
+STATISTICS = {
+    "deepest": Statistic(
+        "mm",
+        "In muscles",
+        "deepest",
+        headline="{} deep in another muscle",
+        curve="Depth of the muscle inside another one, or of that inside it",
+        shown={"curve": 52, "headline": 60},
+    ),
+}
+OF, AGAINST = "surface", "itself"
+
+
+def measure(run: Run, _reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
+    """``deepest`` [mm], as in ``geometry.interpenetration.penetration``: the greatest depth of this muscle and another in each
+    other, by their surfaces, 0 where they are apart. NaN in a frame in which a surface is not known; nothing where the run has no
+    other muscle.
+    """
+    return _measured(run) if run.others else ()
+
+
+@lru_cache(maxsize=32)
+def _measured(run: Run) -> tuple[Measure, ...]:
+    """The same for every reference, so once for all of them."""
+    values, where = np.zeros(len(run.numbers)), [""] * len(run.numbers)
+    for name, other in run.others.items():
+        for i, number in enumerate(run.numbers):
+            one, two = run.positions[i], other.positions[other.numbers.index(number)]
+            if not (np.isfinite(one).all() and np.isfinite(two).all()):
+                values[i], where[i] = np.nan, f"not known of {name}"
+                continue
+            depth, place = penetration(run.surface.moved_to(one), other.surface.moved_to(two))
+            if depth > values[i]:
+                values[i], where[i] = depth, f"{name} at {place_of(place)}"
+    return measures("neighbour_penetration", {"deepest": values}, where)
