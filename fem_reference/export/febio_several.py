@@ -88,7 +88,8 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
         name = f"{one}_{other}"
         febio_mesh.Mesh.pair(sections["Mesh"], f"{name}_pair", f"{one}_touching", f"{other}_touching")
         settings = {"penalty": problem.law.stiffness / 2, "search_radius": febio_contact.SEARCH_RADIUS, "two_pass": 1}
-        febio_contact.pair(sections["Contact"], "sliding-elastic", name, settings)
+        friction = {"fric_coeff": problem.law.friction or 0.0}
+        febio_contact.pair(sections["Contact"], "sliding-elastic", name, settings | friction)
     solver = _found(sections["Control"], "solver")
     if solver.find("symmetric_stiffness") is None:
         febio_mesh.leaf(solver, "symmetric_stiffness", "non-symmetric")

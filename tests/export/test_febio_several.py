@@ -1,6 +1,7 @@
 """Several muscles in FEBio's input file: each as it is alone, with names and numbers of its own, and contact between them."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from fem_reference import export
-from fem_reference.export import febio
+from fem_reference.export import febio, febio_several
 from fem_reference.problems import of_case
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.scenes import casefile
@@ -94,6 +95,7 @@ def test_the_muscles_touch_by_the_surfaces_that_are_not_attached(feb: Element, p
     assert contact.get("type") == "sliding-elastic"
     settings = {one.tag: one.text for one in contact}
     assert (settings["two_pass"], float(settings["penalty"]), settings["laugon"]) == ("1", 0.5 / 2, "0")
+    assert float(settings["fric_coeff"]) == 0
     at = nodes(feb)
     for name in NAMES:
         (surface,) = [one for one in feb.iter("Surface") if one.get("name") == f"{name}_touching"]
@@ -102,6 +104,13 @@ def test_the_muscles_touch_by_the_surfaces_that_are_not_attached(feb: Element, p
         corners = own.points[own.facets["free"][:, :3]]
         assert np.array_equal([[at[i] for i in facet[:3]] for facet in facets], corners)
     assert feb.findtext("Control/solver/symmetric_stiffness") == "non-symmetric"
+
+
+def test_muscles_that_rub_rub_in_febio(problem: MusclesProblem) -> None:
+    assert problem.law is not None
+    rubbing = replace(problem, law=problem.law.model_copy(update={"friction": 0.3}))
+    contacts = {one.get("surface_pair"): one for one in febio_several.model(rubbing).iter("contact")}
+    assert {one.tag: one.text for one in contacts["deep_superficial_pair"]}["fric_coeff"] == "0.3"
 
 
 def test_each_muscle_has_a_folder_that_is_complete(folder: Path) -> None:
