@@ -237,6 +237,10 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings with open ones filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
+    check_element(
+        settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"
+    )  # of a problem made in Python
+    check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
     if isinstance(problem, MusclesProblem) or problem.body.touching:  # parts of contact with bones are of one rank, too
         _check_touching(settings, "reference")
         settings = settings.model_copy(update={"ranks": 1})

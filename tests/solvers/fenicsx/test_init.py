@@ -7,7 +7,7 @@ import pytest
 import shapes
 
 from fem_reference import effects
-from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Polylines, TetMesh
 from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.runs.store import Frame, Outcome
@@ -51,6 +51,29 @@ def test_both_ends_moved_alike_is_a_rigid_motion() -> None:
         assert frame.scalars["min_det_F_quadrature"] == pytest.approx(1, abs=1e-7)
         assert frame.scalars["min_det_F_vertices"] == pytest.approx(1, abs=1e-7)
         assert frame.scalars["energy"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (
+            {"element": "P1"},
+            'element: got "P1", want one for tetrahedron cells with a pressure, which an effect brings',
+        ),
+        ({"element": "Q2/Q1"}, 'element: got "Q2/Q1", want one for tetrahedron cells with a pressure'),
+        ({"element": "P1/P1", "quadrature_degree": 1}, "quadrature_degree: got 1, want 2 or more for P1/P1"),
+    ],
+)
+def test_a_problem_made_in_python_is_refused_as_a_case_is(given, wanted) -> None:
+    problem = shapes.bar((1, 1, 1), (10, 10, 20), {"bottom": None, "top": None}, MUSCLE, (0,))
+    with pytest.raises(InputError, match=wanted):
+        solved(problem, **given)
+
+
+def test_a_pressure_that_no_effect_brings_is_refused() -> None:
+    problem = shapes.bar((1, 1, 1), (10, 10, 20), {"bottom": None, "top": None}, MUSCLE[:1], (0,))
+    with pytest.raises(InputError, match=r'element: got "P2/P1", want one for .* without a pressure'):
+        solved(problem, element="P2/P1")
 
 
 def test_torsion_stiffness_of_a_square_bar() -> None:
