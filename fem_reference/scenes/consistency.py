@@ -15,7 +15,7 @@ FREE = "free"
 
 
 def check_names(case: MuscleCase) -> None:
-    """Names are used once and refer to something."""
+    """Check that names are used once and refer to something."""
     bones = [bone.name for bone in case.bone]
     attachments = [attachment.name for attachment in case.attachment]
     check_acting(case.effects, bones, case.frames, case.place)

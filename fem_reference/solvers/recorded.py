@@ -156,7 +156,7 @@ def checked_about(folder: Path, unit: float | None) -> About:
     said = about(folder)
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
-        raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {unit:g} mm")
+        raise InputError(place, f'"{said.unit}"', f"the unit of --unit or of the case, {unit:g} mm")
     for name, wanted in said.sha256.items():
         file = _about_file(folder).with_name(name)
         got = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "no file"

@@ -91,7 +91,7 @@ def test_gluteus_maximus_goes_out_and_comes_back(data: Path, tmp_path: Path) -> 
 def test_the_unit_of_a_foreign_solver_is_its_own(scene: MuscleCase, foreign: Path, tmp_path: Path, capsys) -> None:
     words = ["compare", scene.place, "--candidate", str(foreign), "--unit", "mm", "--out", str(tmp_path), "--quiet"]
     assert cli.main(words) == cli.BAD_INPUT
-    assert 'candidate.toml: unit: got "m", want what --unit or the case says, a unit of 1 mm' in capsys.readouterr().err
+    assert 'candidate.toml: unit: got "m", want the unit of --unit or of the case, 1 mm' in capsys.readouterr().err
 
 
 def test_the_verb(scene: MuscleCase, tmp_path: Path, capsys) -> None:

@@ -357,7 +357,7 @@ def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
         ('seconds_per_frame = "0.1"', r'candidate\.toml: seconds_per_frame: got "0\.1", want a valid number'),
         ("threads = -1", r"candidate\.toml: threads: got -1, want greater than 0"),
         ("name = mine", r"candidate\.toml: got .*, want a TOML file"),
-        ('unit = "m"', r'candidate\.toml: unit: got "m", want what --unit or the case says, a unit of 1 mm'),
+        ('unit = "m"', r'candidate\.toml: unit: got "m", want the unit of --unit or of the case, 1 mm'),
     ],
 )
 def test_what_a_candidate_says_wrongly(tmp_path: Path, text: str, match: str) -> None:

@@ -266,7 +266,9 @@ def _check_touching(settings: Settings, place: str) -> None:
         want = "1, on which several muscles, or one that touches itself, are solved"
         raise InputError(join(place, "ranks"), settings.ranks, want)
     if settings.linear_solver == "multigrid":
-        raise InputError(join(place, "linear_solver"), '"multigrid"', "another: its levels know no muscles that touch")
+        raise InputError(
+            join(place, "linear_solver"), '"multigrid"', "another: its levels do not support touching muscles"
+        )
 
 
 def _check_ranks(settings: Settings, place: str) -> None:
