@@ -63,9 +63,9 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
     return () if law is None else (Touching(part, part, law.stiffness, law.smoothing, law.friction),)
 
 
-def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints]) -> None:
+def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
     """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k).
+    separate pieces of the mesh of ``cells`` (m, k); or are one, in a body that does not begin ``moved``.
     """
     if not touching:
         return
@@ -77,3 +77,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
         if law.one != law.other and len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
             got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
+        if law.one == law.other and moved:  # what was in front of what is not known
+            raise InputError(
+                "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
+            )

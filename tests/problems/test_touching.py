@@ -46,6 +46,11 @@ def test_a_part_with_itself_feels_no_pressure_at_rest() -> None:
     itself = replace(LAW, other="low_z1")
     check(body(itself), "P1")
     assert [one.allowance(0.5) for one in (LAW, itself, replace(itself, relaxed=(0.0, 1.0)))] == [0.0, 1.0, 0.5]
+    assert [body(one).remembers for one in (LAW, itself)] == [False, True]
+    moved = [replace(body(one), start=lambda points: points + [1.0, 0.0, 0.0]) for one in (LAW, itself)]
+    check(moved[0], "P1")
+    with pytest.raises(fr.InputError, match='start: got places, and "low_z1" that touches itself'):
+        check(moved[1], "P1")
     effect = fr.make_effect("touching", stiffness=2.0, smoothing=0.1, friction=0.2)
     assert with_itself((effect,), "free") == (fr.Touching("free", "free", 2.0, 0.1, 0.2),)
     assert with_itself((), "free") == ()
