@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from math import isfinite
 
 import numpy as np
@@ -65,7 +66,8 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
     """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k); or are one, in a body that does not begin ``moved``.
+    separate pieces of the mesh of ``cells`` (m, k); or are one, in a body that does not begin ``moved``. No pair of
+    facets may have two laws.
     """
     if not touching:
         return
@@ -81,3 +83,15 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
             raise InputError(
                 "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
             )
+    _check_pairs(touching, facets)
+
+
+def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints]) -> None:
+    """Raise InputError where a pair of facets is under two laws, whose pressures would add up."""
+    names = {name for law in touching for name in (law.one, law.other)}
+    own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
+    for (i, law), (j, other) in combinations(enumerate(touching), 2):
+        for one, two in ((other.one, other.other), (other.other, other.one)):
+            if own[law.one] & own[one] and own[law.other] & own[two]:
+                got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
+                raise InputError(f"touching[{j}]", got, "one law for a pair of facets")
