@@ -176,6 +176,15 @@ class Pass:
         """
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
+    def let_fall(self, met: Met) -> None:
+        """Subtract no more than what leaves the points that ``met`` the other side without pressure, nothing of others; of a part
+        with itself, whose shift at rest is not removed: points that have come apart press as others do when they meet again.
+        """
+        if self.own and self.law.relaxed is None:
+            left = np.zeros_like(self.overlaps)
+            left[met.points] = np.maximum(self.law.smoothing - met.gap, 0)
+            self.overlaps = np.minimum(self.overlaps, left)
+
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
 
