@@ -99,8 +99,32 @@ def omissions(measured: list[dict[str, Any]]) -> Drawing:
     return drawn("omissions", "Effects of the reference and features of solvers, left out", (7.2, 3.2), draw)
 
 
+def matrix(measured: dict[str, Any]) -> Drawing:
+    """The verdict of each hard case and solver."""
+    cases, solvers = measured["cases"], [one["solver"] for one in measured["counts"]]
+    colours = _VERDICTS | {"no solution": "#56b4e9", "inconclusive": "#cc79a7", "not applicable": "#e8e8e8"}
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        for verdict in filter(None, colours):
+            places = [
+                (x, y) for y, row in enumerate(measured["verdicts"]) for x, one in enumerate(row) if one == verdict
+            ]
+            if places:
+                axes.scatter(*zip(*places, strict=True), marker="s", s=60, color=colours[verdict], label=verdict)
+        axes.set_xticks(range(len(solvers)), solvers, rotation=90)
+        axes.set_yticks(range(len(cases)), cases, fontsize="small")
+        axes.xaxis.tick_top()
+        axes.invert_yaxis()
+        axes.grid(visible=False)
+        figure.legend(loc="outside lower center", ncols=6, fontsize="small")
+
+    return drawn("matrix", "Hard cases by solver", (7.2, 1.6 + 0.19 * len(cases)), draw)
+
+
 def hard_cases(measured: dict[str, Any]) -> Drawing:
-    """The number of hard cases with each verdict, by solver."""
+    """The number of hard cases with each verdict, by solver; the matrix where verdicts of each case are kept."""
+    if "verdicts" in measured:
+        return matrix(measured)
     rows = [one for one in measured["counts"] if sum(one.get(key, 0) for key in _VERDICTS if key)][::-1]
 
     def draw(figure: Figure, axes: Axes) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fem_reference.assessment import cost_study, fronts
+from fem_reference.assessment.recommendation import TIME
 from fem_reference.assessment.stress import VERDICTS
 from fem_reference.foundations.records import parse
 
@@ -286,7 +287,7 @@ def _fibre_ends_rows() -> str:
 def _fronts(found: dict[str, Any]) -> Any:
     """A study of all solvers, with the errors and costs that are drawn."""
     case = found["cases"][0]
-    errors, costs = (_SURFACE, "fibre_length.rms_percent"), ("seconds_per_frame", _TIME, "unknowns", fronts.LOAD)
+    errors, costs = (_SURFACE, "fibre_length.rms_percent"), (TIME, _TIME, "unknowns", fronts.LOAD)
     points = [
         one | {"errors": _only(one["errors"], errors), "costs": _only(one["costs"], costs)} for one in case["points"]
     ]
@@ -295,6 +296,27 @@ def _fronts(found: dict[str, Any]) -> Any:
     return (
         {name: case[name] for name in names} | drawn | {name: _only(case[name], errors) for name in ("units", "bars")}
     )
+
+
+def _fronts_rows() -> str:
+    case = parse(cost_study.CaseStudy, kept("fronts")["measured"], "fronts")
+    rows = []
+    for solver in fronts.solvers(case.counted):
+        price = fronts.price(case.counted, solver, _SURFACE, TIME)
+        own = next((one for one in case.counted if one.solver == solver and one.is_default), None)
+        if price is None:
+            continue
+        half = "more time hardly helps"
+        if price.factor > 1:
+            half = f"{'costs' if price.is_measured else 'would cost'} {number(price.factor, 2)} times the time"
+        rows.append((f"`{solver}`", _error_and_time(own), _error_and_time(price.nearest), price.nearest.label, half))
+    head = ("solver", "settings of the case", "most accurate", "by", "half the error")
+    return table("fronts", head, rows)
+
+
+def _error_and_time(point: fronts.Point | None) -> str:
+    pair = point.at(_SURFACE, TIME) if point else None
+    return f"{number(pair[0], 2)} mm, {number(pair[1], 2)} s" if pair else "no result"
 
 
 def _only(found: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
@@ -313,7 +335,10 @@ def _stress(found: dict[str, Any]) -> Any:
             finest = {of for _, _, of, _ in _END.findall(said[2]) if of}
             ends.append({"case": one["case"], "verdict": one["verdict"], "frame": int(said[1])})
             ends[-1] |= {"off": off | dict.fromkeys(finest, "finest")}
-    return {"counts": counts, "ends": ends}
+    cases = list(dict.fromkeys(one["case"] for one in found["cells"]))
+    by_place = {(one["case"], one["solver"]): one["verdict"] for one in found["cells"]}
+    verdicts = [[by_place.get((case, solver), "") for solver in found["solvers"]] for case in cases]
+    return {"counts": counts, "ends": ends, "cases": cases, "verdicts": verdicts}
 
 
 def _stress_solvers() -> str:
@@ -399,6 +424,7 @@ TABLES = {
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
     "study_reference": _study_reference,
+    "fronts_solvers": _fronts_rows,
     "fibre_ends": _fibre_ends_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,

@@ -156,11 +156,20 @@ def _parameters() -> dict[str, dict[str, Any]]:
     return {name: {key: field for key, field in fields.items() if key != "in"} for name, fields in found.items()}
 
 
+_RAMP = "list of table RampPoint (at least 1)"
+
+
 def _parameter(named: tuple[str, Any]) -> str:
     """A key with its value, and its unit alone where it is a quantity."""
     key, field = named
     value = _value(field.annotation, field.metadata)
-    for long, short in (("three quantities, kept in", "three, in"), ("quantity, kept in ", ""), (" (", " "), (")", "")):
+    for long, short in (
+        (_RAMP, "list of `{ frame, amount }`"),
+        ("three quantities, kept in", "three, in"),
+        ("quantity, kept in ", ""),
+        (" (", " "),
+        (")", ""),
+    ):
         value = value.replace(long, short)
     return f"`{key}` ({_cell(value)}{'' if field.is_required() else ', optional'})"
 

@@ -197,6 +197,7 @@ ADDED = {
     "regions, membranes, tendons that pull": 880,
     "contact between parts of the surface": 740,
     "several muscles in one scene": 1080,
+    "exports of several muscles, the depth of muscles in each other": 250,
     "friction": 590,
     "contact of a part with itself": 130,
     "own solvers as commands, load of the machine, answers first": 880,

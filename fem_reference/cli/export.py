@@ -16,7 +16,6 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.studies import by_muscle, judging, refinement
 from fem_reference.studies.execution import Bench
 
@@ -47,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     if options.candidate or options.unit or options.solve:
         got = f"--candidate, --unit or --solve for {options.format}"
         raise InputError("export", got, f"them for {PARAVIEW} only")
-    bench = Bench(scene if isinstance(scene, MusclesCase) else casefile.muscle(scene), out(options) / "runs")
+    bench = Bench(scene if scene.parts else casefile.muscle(scene), out(options) / "runs")
     written = export.export(bench.scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
     write_output(facts, "\n".join(lines(facts)), options)

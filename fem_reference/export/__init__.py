@@ -10,6 +10,7 @@ from fem_reference.export.folders import check, new_folder, write_text
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.problems.of_case import CaseProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -30,7 +31,7 @@ _FEBIO_OF_ALL = """
 _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the muscle at rest"
 
 
-def export(case: Case, build: Callable[[], MuscleProblem | MusclesProblem], folder: Path, form: Format) -> list[str]:
+def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. Of several muscles each has a folder
@@ -46,7 +47,7 @@ def export(case: Case, build: Callable[[], MuscleProblem | MusclesProblem], fold
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
         else:
-            _write(_parts(case)[0], problem, part, _FEBIO_FILES if form == "febio" else "")
+            _write(_parts(case)[0], _muscle(problem), part, _FEBIO_FILES if form == "febio" else "")
         if form == "febio":
             _write_febio(case, problem, part)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
@@ -56,7 +57,14 @@ def export(case: Case, build: Callable[[], MuscleProblem | MusclesProblem], fold
 
 def _parts(case: Case) -> tuple[MuscleCase, ...]:
     """The muscles of a case."""
-    return case.parts or (casefile.muscle(case),)
+    return tuple(casefile.muscle(one) for one in case.parts or (case,))
+
+
+def _muscle(problem: CaseProblem) -> MuscleProblem:
+    """The problem of a muscle; InputError where there is none."""
+    if problem.muscle is None:
+        raise InputError("export", "a scalar field", "a muscle")
+    return problem.muscle
 
 
 def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) -> None:
@@ -67,7 +75,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
     """A folder for each muscle, and what is of all."""
-    for part, (name, one) in zip(case.parts, problem.problems.items(), strict=True):
+    for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")
         if form == "febio":
@@ -79,14 +87,14 @@ def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Form
     )
 
 
-def _write_febio(case: Case, problem: MuscleProblem | MusclesProblem, folder: Path) -> None:
+def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
     """FEBio's own file, and its differences."""
     if isinstance(problem, MusclesProblem):
         differences = febio_several.notes(problem)
         febio.write_model(febio_several.model(problem), folder)
     else:
-        differences = febio_contact.notes(problem)
-        febio.write(problem, folder)
+        differences = febio_contact.notes(_muscle(problem))
+        febio.write(_muscle(problem), folder)
     for difference in differences:
         log.warning("another model in FEBio: %s", difference)
     write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))

@@ -110,7 +110,10 @@ def _known(result: Comparison) -> list[str]:
 def _bar(result: Comparison, bar: ErrorBar) -> str:
     assert result.error_bars is not None  # the bar is of them
     at = f"frame {result.error_bars.numbers[bar.widest]}"
-    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.widest]:.2g} {bar.unit} at {at}"
+    value = bar.values[bar.widest]
+    return (
+        f"no error bar is known at {at}" if math.isnan(value) else f"\N{PLUS-MINUS SIGN} {value:.2g} {bar.unit} at {at}"
+    )
 
 
 def run_text(run: Run, found: Alone) -> str:

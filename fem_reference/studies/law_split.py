@@ -8,6 +8,8 @@ import numpy as np
 
 from fem_reference.effects import Effect, make, moduli, name_of, regions_named
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import vertex_areas
+from fem_reference.metrics import rms
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
@@ -19,8 +21,8 @@ PARTS = ("left out", "law", "mesh", "convergence")
 
 @dataclass(frozen=True)
 class Split:
-    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface's vertices at the ``frame`` where the
-    total is greatest; the sum of the parts bounds it.
+    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface at the ``frame`` where the total is
+    greatest, ``surface_deviation.rms``; the sum of the parts bounds it.
     """
 
     frame: int
@@ -75,7 +77,8 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 
 def _apart(one: Run, other: Run, i: int) -> float:
-    return float(np.sqrt(((one.positions[i] - other.positions[i]) ** 2).sum(axis=1).mean()))
+    away = np.linalg.norm(one.positions[i] - other.positions[i], axis=1)
+    return float(rms(away[None], vertex_areas(one.surface.points, one.surface.triangles))[0])
 
 
 def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:

@@ -1,6 +1,6 @@
 """Contact of bodies with rigid ones: a plate on a block, and a ball on a large body (Hertz)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 from scipy.optimize import brentq
@@ -91,11 +91,45 @@ def known_ball(name: str) -> float:
     return float(getattr(known, name))
 
 
+CONTACT = partial(Entry, group="contact", relative=True, kind="closed form")
+# Of readings of a ball their ends of names, titles and units.
+_SAID = {
+    "force": ("force", "its force", "N"),
+    "contact_radius": ("radius", "the radius of the contact", "mm"),
+    "peak_pressure": ("pressure", "the greatest pressure", "MPa"),
+}
+
+
+def hertzian(
+    name: str,
+    title: str,
+    measure: Callable[[Lab, str, float], Finding],
+    known: Callable[[str], float],
+    because: str,
+    readings: Iterable[str],
+) -> Iterator[Entry]:
+    """The entries of a pressed ball, one for each of the ``readings``, whose words end its ``name`` and ``title``."""
+    for reading in readings:
+        end, words, unit = _SAID[reading]
+        yield CONTACT(
+            name=name.format(end),
+            title=title.format(words),
+            unit=unit,
+            measure=measure,
+            given={"reading": reading, "radius": RADIUS},
+            **control("a ball of twice the radius", radius=2 * RADIUS),
+            truth=partial(known, reading),
+            within=0.02,
+            because=because,
+            source="Hertz 1882; validation/hertz.py",
+            **SLOW,
+        )
+
+
 ENTRIES = (
     *(
-        Entry(
+        CONTACT(
             name=f"plate_{element.lower().replace('/', '_')}",
-            group="contact",
             title=f"A smooth plate on a block, by {element}: its force at half the height",
             unit="N",
             measure=plate,
@@ -103,34 +137,17 @@ ENTRIES = (
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
-            relative=True,
             because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",
-            kind="closed form",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
     ),
-    *(
-        Entry(
-            name=f"hertz_{name}",
-            group="contact",
-            title=f"A rigid ball pressed into a large body: {words}",
-            unit=unit,
-            measure=ball,
-            given={"reading": reading, "radius": RADIUS},
-            **control("a ball of twice the radius", radius=2 * RADIUS),
-            truth=partial(known_ball, reading),
-            within=0.02,
-            relative=True,
-            because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
-            kind="closed form",
-            source="Hertz 1882; validation/hertz.py",
-            **SLOW,
-        )
-        for name, words, unit, reading in (
-            ("force", "its force", "N", "force"),
-            ("radius", "the radius of the contact", "mm", "contact_radius"),
-            ("pressure", "the greatest pressure", "MPa", "peak_pressure"),
-        )
+    *hertzian(
+        "hertz_{}",
+        "A rigid ball pressed into a large body: {}",
+        ball,
+        known_ball,
+        "the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
+        READINGS,
     ),
 )

@@ -1,10 +1,11 @@
 """Friction: a block on an incline, one under a plate that slides over it, and one that slides over another."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.assessment.catalogue import Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.geometry.rigid_bodies import HalfSpace
@@ -13,12 +14,13 @@ from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Affine
 from fem_reference.problems.touching import Touching
+from fem_reference.verification.contact import CONTACT
 from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_hooke
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], [MPa/mm], and height [mm]
 NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, over the friction
-CONTACT = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
+LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
 def incline(lab: Lab, friction: float) -> Finding:
@@ -31,7 +33,7 @@ def incline(lab: Lab, friction: float) -> Finding:
     weight = make("gravity", density=WEIGHT / HEIGHT / 1e4, acceleration=[0.0, 0.0, -1e4], ramp=at_once)
     mesh = shapes.box((2, 2, 1), (1.0, 1.0, HEIGHT), "hexahedron")
     body = Body(
-        mesh, (*neo_hooke(MU, BULK), weight), (), frames, contact=replace(CONTACT, friction=friction), bones=(plane,)
+        mesh, (*neo_hooke(MU, BULK), weight), (), frames, contact=replace(LAW, friction=friction), bones=(plane,)
     )
     run = lab.solve(body, "Q1/P0", first_step=0.1, residual=1e-12, smallest_step=1e-3)
     reached = run.states[-1]
@@ -71,50 +73,34 @@ def blocks(lab: Lab, friction: float) -> Finding:
     return Finding(float(-along / across), note=f"{lost:.2g} N mm are lost")
 
 
+DRAG = partial(CONTACT, unit="", given={"friction": FRICTION}, truth=FRICTION)
+
 ENTRIES = (
-    Entry(
+    DRAG(
         name="sliding_blocks",
-        group="contact",
         title="A block that slides over another: its drag over its normal force",
-        unit="",
         measure=blocks,
-        given={"friction": FRICTION},
         **control("friction 1 % greater", friction=1.01 * FRICTION),
-        truth=FRICTION,
         within=2e-3,
-        relative=True,
         because="under a pressure of a thousandth of their moduli faces tilt by as much, and their normals do",
-        kind="closed form",
         source="Coulomb: a drag of the friction times the normal force",
     ),
-    Entry(
+    DRAG(
         name="incline",
-        group="contact",
         title="A block on a plane that turns below it: the steepest at which it sticks",
-        unit="",
         measure=incline,
-        given={"friction": FRICTION},
         **control("friction 0.11 % greater", friction=1.0011 * FRICTION),
-        truth=FRICTION,
         within=1.5e-4,
-        relative=True,
         because="tangents are requested 0.01 % below and 0.02 % above: the block must stick at the first and be lost at the second",
-        kind="closed form",
         source="Coulomb: the tangent of the angle is the coefficient of friction",
     ),
-    Entry(
+    DRAG(
         name="sliding_plate",
-        group="contact",
         title="A plate that slides over a block: its drag over its normal force",
-        unit="",
         measure=drag,
-        given={"friction": FRICTION},
         **control("friction 1 % greater", friction=1.01 * FRICTION),
-        truth=FRICTION,
         within=1e-7,
-        relative=True,
         because="each point that slides has its limit to rounding: what is left is the residual of 1e-12 N over forces of 1e-4 N",
-        kind="closed form",
         source="Coulomb: a drag of the friction times the normal force",
     ),
 )

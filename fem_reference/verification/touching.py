@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.assessment.catalogue import Finding, Lab
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.paths import Affine
@@ -15,6 +15,7 @@ from fem_reference.runs.store import Frame
 from fem_reference.verification.contact import (
     APPROACH,
     BULK,
+    CONTACT,
     CORE,
     FAR,
     MU,
@@ -22,9 +23,10 @@ from fem_reference.verification.contact import (
     RADIUS,
     YOUNG,
     ball_readings,
+    hertzian,
     in_series,
 )
-from fem_reference.verification.parts import NO_GRADIENT, SLOW, clamped, control, find, neo_hooke
+from fem_reference.verification.parts import NO_GRADIENT, clamped, control, find, neo_hooke
 
 SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], and [MPa/mm]
 SMOOTHING = 0.002  # [mm]
@@ -111,9 +113,8 @@ def known_ball(name: str) -> float:
 
 ENTRIES = (
     *(
-        Entry(
+        CONTACT(
             name=name,
-            group="contact",
             title=f"Two blocks with unrelated meshes pressed together{words}: their force",
             unit="N",
             measure=partial(blocks, itself=bool(words)),
@@ -121,33 +122,17 @@ ENTRIES = (
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
             truth=partial(in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
-            relative=True,
             because="points of either mesh do not integrate the other's functions exactly: 6e-5 remain, and 2 % of the pressure",
-            kind="closed form",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one part that touches itself"))
     ),
-    *(
-        Entry(
-            name=f"hertz_elastic_{name}",
-            group="contact",
-            title=f"An elastic ball pressed against a large body of the same material: {words}",
-            unit=unit,
-            measure=ball,
-            given={"reading": reading, "radius": RADIUS},
-            **control("a ball of twice the radius", radius=2 * RADIUS),
-            truth=partial(known_ball, reading),
-            within=0.02,
-            relative=True,
-            because="the mesh and the overlap of both leave about 1 %, strains of a tenth and the end of the bodies less",
-            kind="closed form",
-            source="Hertz 1882; validation/hertz.py",
-            **SLOW,
-        )
-        for name, words, unit, reading in (
-            ("force", "its force", "N", "force"),
-            ("radius", "the radius of the contact", "mm", "contact_radius"),
-        )
+    *hertzian(
+        "hertz_elastic_{}",
+        "An elastic ball pressed against a large body of the same material: {}",
+        ball,
+        known_ball,
+        "the mesh and the overlap of both leave about 1 %, strains of a tenth and the end of the bodies less",
+        READINGS,
     ),
 )

@@ -31,14 +31,15 @@ def test_muscles_may_overlap_by_the_give_of_their_own_contact_alone() -> None:
     lines = Polylines(np.array([[0.5, 0.5, 0.1], [0.5, 0.5, 0.9]]), np.array([0, 2]))
     cube = MuscleProblem(shapes.skin(mesh), (), (), (0, 1), None, mesh=mesh, effects=(), fibres=lines)
     law = MuscleContact(stiffness="1 MPa/mm", smoothing="0.01 mm")
-    problem = MusclesProblem(dict.fromkeys("abc", cube), (), law, apart=True)
+    problem = MusclesProblem(dict.fromkeys("abc", cube), (("a", "b"), ("b", "c")), law, apart=True)
     count = len(mesh.points)
     lifts = np.repeat([0.0, 0.9, 2.5], count)[:, None] * [0.0, 0.0, 1.0]
     nodes = np.tile(mesh.points, (3, 1)) + lifts
 
     def denied(pressed: str, pressure: float, places: np.ndarray | None = nodes) -> list[str]:
         """What is not met under a ``pressure`` [MPa] between two muscles."""
-        names = ("touching_pressure", pressure_name(*(f"{one} free" for one in pressed)))
+        known = {pressure_name(f"{one} free", f"{other} free"): 0.0 for one, other in problem.pairs}
+        known |= dict.fromkeys(("touching_pressure", pressure_name(*(f"{one} free" for one in pressed))), pressure)
         run = Run(
             "reference",
             "fenicsx",
@@ -46,7 +47,7 @@ def test_muscles_may_overlap_by_the_give_of_their_own_contact_alone() -> None:
             (0,),
             cube.surface,
             cube.surface.points[None],
-            scalars={name: np.array([pressure]) for name in names},
+            scalars={name: np.array([value]) for name, value in known.items()},
         )
         return [one.name for one in between(problem, run, lambda _: places) if not one.met]
 

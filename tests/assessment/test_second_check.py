@@ -48,6 +48,7 @@ def test_every_shipped_control_is_denied_and_the_true_run_passes() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_pictures")
 def test_bones_carry_the_weight_of_a_true_run(tmp_path, monkeypatch) -> None:
     """As much as the residual allows: the weight of the same muscle at the full amount is 0.1 mN at least."""
     monkeypatch.chdir(tmp_path)
@@ -64,6 +65,7 @@ def test_bones_carry_the_weight_of_a_true_run(tmp_path, monkeypatch) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_pictures")
 def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     scene, out = small.write(tmp_path / "bar"), tmp_path / "out"

@@ -101,7 +101,7 @@ def test_around_two_it_is_smooth_outside_and_the_same_backwards() -> None:
 
 def test_directions_are_the_slopes_of_the_length() -> None:
     """Moving an end changes the length by the direction there: differences over 2e-4 mm."""
-    starts, ends = beside(20)
+    starts, ends = beside(6)
     paths, step = around([EGG, BALL], starts, ends), 1e-4
     assert not paths.failed.any()
     axis = np.array([1, 2, 3]) / np.sqrt(14)  # oblique: every component counts

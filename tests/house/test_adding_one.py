@@ -65,8 +65,8 @@ def volume(lab: Lab, pressure: float) -> float:
 
 ENTRIES = (
     Entry(
-        name="own_entry",
-        group="own",
+        name="added_entry",
+        group="added",
         title="A cube in a fluid: its volume",
         unit="1",
         measure=volume,
@@ -146,7 +146,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
         np.array([triangle_areas(points, each.surface.triangles).sum() for points in each.positions])
         for each in (run, reference)
     )
-    return measures("own_metric", {"deviation": 100 * (areas / wanted - 1)})
+    return measures("added_metric", {"deviation": 100 * (areas / wanted - 1)})
 '''.lstrip()
 
 SOLVER = '''
@@ -172,7 +172,7 @@ SOLVES = (
         solve=solve,
         example=_SETTINGS,
         depends_on=("order",),
-        table=(TableRow("PBD", "own_solver", _SETTINGS),),
+        table=(TableRow("PBD", "added_solver", _SETTINGS),),
     ),
 )
 '''.lstrip()
@@ -187,7 +187,7 @@ print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu *
 '''.lstrip()
 
 VERB = '''
-"""The verb ``own_verb``: how many cases there are."""
+"""The verb ``added_verb``: how many cases there are."""
 
 import argparse
 
@@ -211,62 +211,62 @@ def run(options: argparse.Namespace) -> int:
 
 KINDS = {
     "verb": New(
-        {"fem_reference/cli/own_verb.py": VERB},
+        {"fem_reference/cli/added_verb.py": VERB},
         {"tests/cli/test_verbs.py": 3},
         {
             "fem_reference --help": "how many cases there are",
-            "fem_reference own_verb": " cases",
-            "fem_reference own_verb --names --quiet": "hip_flexion",
-            "!fem_reference own_verb --no-such-option": "--no-such-option",
+            "fem_reference added_verb": " cases",
+            "fem_reference added_verb --names --quiet": "hip_flexion",
+            "!fem_reference added_verb --no-such-option": "--no-such-option",
         },
     ),
     "effect": New(
-        {"fem_reference/effects/own_effect.py": EFFECT},
+        {"fem_reference/effects/added_effect.py": EFFECT},
         {"tests/contracts/test_every_effect.py": 8, "tests/solvers/common/test_open_formats.py": 1},
         {},
     ),
     "metric": New(
-        {"fem_reference/metrics/own_metric.py": METRIC},
+        {"fem_reference/metrics/added_metric.py": METRIC},
         {"tests/metrics/test_init.py": 2, "tests/contracts/test_every_metric.py": 2},
         {
-            "fem_reference list": "own_metric",
+            "fem_reference list": "added_metric",
         },
     ),
     "solver": New(
-        {"fem_reference/solvers/own_solver.py": SOLVER},
+        {"fem_reference/solvers/added_solver.py": SOLVER},
         {"tests/contracts/test_every_solver.py": 1, "tests/solvers/test_init.py": 1},
         {
-            "fem_reference list": "own_solver",
+            "fem_reference list": "added_solver",
         },
     ),
     "verification entry": New(
-        {"fem_reference/verification/own_entry.py": ENTRY},
+        {"fem_reference/verification/added_entry.py": ENTRY},
         {"tests/contracts/test_every_entry.py": 3},
         {
-            "fem_reference verify own --quiet": "verdict: pass, 1 of 1 pass",
-            "!fem_reference verify --negative-control own_entry --quiet": "fail (negative control)",
+            "fem_reference verify added --quiet": "verdict: pass, 1 of 1 pass",
+            "!fem_reference verify --negative-control added_entry --quiet": "fail (negative control)",
         },
     ),
     "mesh": New(
-        folder("meshes/box", "meshes/own_mesh"),
+        folder("meshes/box", "meshes/added_mesh"),
         {"tests/contracts/test_every_mesh.py": 1},
         {},
     ),
     "case": New(
-        folder("cases/rod", "cases/own_case", {"rod": "own rod"}),
+        folder("cases/rod", "cases/added_case", {"rod": "own rod"}),
         {"tests/contracts/test_every_case.py": 1},
         {
-            "fem_reference list": "own_case",
-            "fem_reference run own_case --solver listing --quiet": "pass: listing nodal_error",
+            "fem_reference list": "added_case",
+            "fem_reference run added_case --solver listing --quiet": "pass: listing nodal_error",
         },
     ),
     "example": New(
-        {"examples/own_example.py": EXAMPLE},
+        {"examples/added_example.py": EXAMPLE},
         {"tests/house/test_examples.py": 1},
         {},
     ),
     "truth": New(
-        {"validation/own_truth.py": TRUTH},
+        {"validation/added_truth.py": TRUTH},
         {"tests/verification/test_parts.py": 1},
         {},
     ),
@@ -308,7 +308,9 @@ def test_one_new_file_or_folder_is_all_that_commands_need(kind: str, copy: Path)
 
 def test_one_new_file_or_folder_is_all_that_tests_need(copy: Path) -> None:
     files = [file for new in KINDS.values() for file in new.tested]
-    status, output = printed_by(["pytest", "-q", "-rA", *files, "-k", "own_ or zero or (solvers and test_init)"], copy)
+    status, output = printed_by(
+        ["pytest", "-q", "-rA", *files, "-k", "added_ or zero or (solvers and test_init)"], copy
+    )
     assert status == 0, output
     passed = collections.Counter(re.findall(r"^PASSED (tests/[^:]+)::", output, re.MULTILINE))
     for kind, new in KINDS.items():

@@ -3,6 +3,7 @@
 import json
 import re
 
+import drawn_results
 import example_pictures
 import measured
 import measurements
@@ -47,6 +48,13 @@ def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
     ]
     kept = measurements.MEASUREMENTS["stress"].keep({"solvers": ["fenicsx", "pbd"], "cells": cells})
     assert kept["counts"] == [{"solver": "fenicsx", "ok": 2}, {"solver": "pbd", "failed": 1}]
+    assert kept["cases"] == ["twist", "hip"]
+    assert kept["verdicts"] == [["ok", "failed"], ["ok", ""]]
+    seen = drawn_results.hard_cases(kept).markup
+    good, bad = (
+        len(re.findall(rf"<use [^>]*var\({colour}\)", seen)) for colour in ("--good, #14713a", "--bad, #b3261e")
+    )
+    assert (good, bad) == (3, 2)  # a square for each cell, and one in the legend
     off = {"1": 1.5e-13, "40": "out of steps", "10": "finest"}
     assert kept["ends"] == [{"case": "twist", "verdict": "ok", "frame": 5, "off": off}]
 

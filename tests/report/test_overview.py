@@ -37,6 +37,8 @@ def test_a_comparison_is_printed_with_its_worst_frames_bars_and_verdict(comparis
     assert not any("error bars" in line for line in lines)
     bars = comparison_text(with_bars(comparison)).splitlines()
     assert any(line.startswith("error bars of the reference") for line in bars)
+    assert "  surface_deviation max: no error bar is known at frame 40" in bars
+    assert not any("\N{PLUS-MINUS SIGN} nan" in line for line in bars)
 
 
 def test_a_doubtful_reference_is_printed_with_its_reason(comparison) -> None:

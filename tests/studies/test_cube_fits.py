@@ -31,14 +31,14 @@ def test_a_number_is_never_taken_for_an_order() -> None:
     assert set(collagen_law(1).to) == {one.name for one in QUANTITIES if not one.is_order}
 
 
-@pytest.mark.slow
-def test_collagen_meets_more_than_the_shipped_law_can() -> None:
+@pytest.mark.parametrize("most", [6, pytest.param(100, marks=[pytest.mark.slow, pytest.mark.nightly])])
+def test_collagen_meets_more_than_the_shipped_law_can(most) -> None:
     def misses(values) -> float:
         return sum(((values[one.name] - one.truth) / one.within) ** 2 for one in QUANTITIES)
 
-    found = collagen_law()
+    found = collagen_law(most)
     # Its fibres have less than the specific tension of any published muscle; the other two have no published range.
     assert [one[1] for one in found.parameters.values()] == [(0.225, pytest.approx(0.35)), None, None]
     assert found.inside is False
-    assert found.converged
+    assert found.converged == (most == 100)
     assert misses(found.values) < misses(shipped_law().values) / 5

@@ -8,6 +8,7 @@ import turned_bar
 
 import fem_reference as fr
 from fem_reference.foundations.errors import InputError
+from fem_reference.metrics import context_of, find, measure
 from fem_reference.studies import law_split
 from fem_reference.studies.execution import Bench
 
@@ -46,6 +47,9 @@ def test_each_part_is_found_where_it_was_put(bench) -> None:
     assert found.parts["law"] > 0.01
     assert found.parts["mesh"] > 0.1
     assert found.total <= sum(found.parts.values())
+    reference = bench.reference()
+    measures = measure(exact, reference, context_of(bench.setup(), reference), ["surface_deviation"])
+    assert found.total == pytest.approx(find(measures, "surface_deviation", "rms").worst.value, rel=1e-12)
     # 1 mm everywhere, with law and mesh as before.
     off = replace(exact, positions=exact.positions + [0, 0, 1.0])
     assert law_split.split(bench, off, law).parts["convergence"] == pytest.approx(1)

@@ -180,8 +180,8 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and ``contact_pressure`` [MPa] at a point, ``PART.contact_pressure`` in parts;
-        the rest area in contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, queries of distances;
+        """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
+        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, whose distance was asked for;
         ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0

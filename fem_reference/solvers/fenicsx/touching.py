@@ -34,8 +34,14 @@ class TouchingForces:
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
-        self.unknowns, self.spent = displacement.unknowns, spent
-        self.passes, self.rims = self._passes(body, form, displacement)
+        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
+        for law in body.touching:
+            names = dict.fromkeys((law.one, law.other))
+            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
+            low, high = parts[law.one], parts[law.other]
+            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
+            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
+        self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
@@ -71,24 +77,14 @@ class TouchingForces:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
-    @staticmethod
-    def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
-        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
-        its points may not touch, None where there is none, or where it is felt.
-        """
-        both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
-        sides = [(law, *pair) for law, pairs in both for pair in pairs]
-        skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
-        parts = {name: form.regions[name] for _, name, _ in sides}
-        own = {name: facets_of(displacement, body.mesh, part) for name, part in parts.items()}
-        passes, rims = list[Pass](), list[Pass | None]()
-        for (law, one, other), around in zip(sides, skins, strict=True):
-            felt = np.concatenate([parts[other], around]) if law.around else None
-            whole = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
-            passes.append(Pass(law, own[one], whole, law.forces if one == law.one else law.forces[::-1]))
-            ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
-            rims.append(ends and Pass(law, own[one], ends, (one, other)))
-        return passes, rims
+    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
+        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
+        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
+        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
+        return [
+            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
+            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
+        ]
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
@@ -151,9 +147,10 @@ class TouchingForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, of several laws each its own pressure
-        too (``Touching.pressure_name``); the rest area under pressure, ``touching_area`` [mm2], the mean of both sides; the number
-        of points under pressure, ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm],
-        where it is removed; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
+        too (``Touching.pressure_name``); the rest area under pressure,
+        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
+        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
+        the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
