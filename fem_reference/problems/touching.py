@@ -20,7 +20,8 @@ class Touching:
     facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
     ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
-    an overlap at rest is removed, as that with bones is.
+    an overlap at rest is removed, as that with bones is; None: that of two parts presses at once, that of a part with itself never,
+    until it comes apart.
     """
 
     one: str
