@@ -31,10 +31,10 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
     if law.one == law.other:
-        skin, part = Surface(points, triangles), _among(facets, one)[owner]
+        skin, own = Surface(points, triangles), _among(facets, one)[owner]
         pairs = self_crossings(skin)
-        crossed = (points[triangles[some]] for some in pairs[part[pairs].any(axis=1)].T)
-        return max(float(overlaps(*crossed).max(initial=0.0)), depth_within(skin, part)) - _bulge(mesh, points, one)
+        crossed = (points[triangles[some]] for some in pairs[own[pairs].any(axis=1)].T)
+        return max(float(overlaps(*crossed).max(initial=0.0)), depth_within(skin, own)) - _bulge(mesh, points, one)
     piece = _pieces(mesh)
     depths, parts = [0.0], list[Surface]()
     for part, against in ((one, other), (other, one)):

@@ -180,8 +180,8 @@ class TouchingForces:
         if any(self.rubbing):
             self.seen = np.full_like(self.seen, np.nan)  # what holds the points is another
             self.look()
-        for one, (met, _) in zip(self.passes, self.now, strict=True):
-            one.let_fall(met)
+        for side, (met, _) in zip(self.passes, self.now, strict=True):
+            side.let_fall(met)
         self.settled = self.state
 
     @property
