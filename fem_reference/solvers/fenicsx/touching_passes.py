@@ -106,7 +106,7 @@ class Pass:
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
-        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), nodes)
+        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), 0 * points[:, 0], nodes)
         some, facets = self._beside(nodes, points, some, facets, most)
         some, facets = self._outside(some, facets, settled or (unknowns, None))
         there = self.other.nearest(nodes, facets, points[some])
@@ -141,15 +141,17 @@ class Pass:
         kept = (height > -least - bulge[facets]) | held
         return some[kept], facets[kept]
 
-    def _near(self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm]; of a part with itself only those
-        that may touch each other (``OwnPairs.near``).
+    def _near(
+        self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, more: Floats, *states: Floats
+    ) -> tuple[Ints, Ints]:
+        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm] and what a point reaches ``more``
+        (n,); of a part with itself only those that may touch each other (``OwnPairs.near``), in whose balls points stay.
         """
         if self.own is None:
-            return pairs(points, balls[0], reach)
+            return pairs(points, balls[0], reach + more.max())
         one, facets = self.own.near(balls, reach, *states)
         some, facets = (one[:, None] * self.each + np.arange(self.each)).ravel(), np.repeat(facets, self.each)
-        close = np.linalg.norm(points[some] - balls[0][facets], axis=1) <= reach[facets]
+        close = np.linalg.norm(points[some] - balls[0][facets], axis=1) <= reach[facets] + more[some]
         return some[close], facets[close]
 
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
@@ -241,9 +243,9 @@ class Pass:
         shift = (new - old).mean(axis=(0, 1))  # what all do together changes nothing
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
-        longest = np.linalg.norm(ends - starts, axis=1).max() / 2
+        far = np.linalg.norm(ends - starts, axis=1) / 2
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2
-        some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii + longest, old, new)
+        some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii, far, old, new)
         some, facets = some[free[some]], facets[free[some]]
         pieces = self.pieces[facets]
         each, which = pieces.shape[1], facets[:, None, None]
