@@ -23,6 +23,7 @@ _STAYS = 0.05
 _FACING = -0.5
 # Of a part with itself, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
 _DEEP = 0.125
+_AT_ONCE = 100000  # pairs whose paths are followed together
 _BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
 
 
@@ -247,11 +248,13 @@ class Pass:
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2
         some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii, far, old, new)
         some, facets = some[free[some]], facets[free[some]]
-        pieces = self.pieces[facets]
-        each, which = pieces.shape[1], facets[:, None, None]
-        corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
-        points = np.repeat(some, each)
-        return np.unique(points[passed(starts[points], ends[points], *corners)])
+        lost = [np.zeros(0, np.int64)]
+        for part in np.array_split(np.arange(len(some)), len(some) // _AT_ONCE + 1):
+            pieces = self.pieces[facets[part]]
+            which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
+            corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
+            lost.append(points[passed(starts[points], ends[points], *corners)])
+        return np.unique(np.concatenate(lost))
 
 
 def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:
