@@ -14,7 +14,6 @@ from fem_reference.effects import in_situ, touching
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances, flattened
-from fem_reference.geometry.intersections import overlaps, self_crossings
 from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
@@ -22,7 +21,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.overlaps import longest_edge, overlap_at
+from fem_reference.problems.overlaps import longest_edge, overlap_at, through_itself
 from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
@@ -37,6 +36,8 @@ _SPRINGS = 1.5
 _TURN = 1.01 * math.pi / 2
 # Between contact points, half a spacing apart, a right-angled edge penetrates by a quarter of it, and a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
+# Contact of a part with itself gives by less than this share of the spacing, whatever pressure is recorded.
+_OWN = 0.5
 # Contact gives way where a bone is deeper than this share of half its thickness, for any stiffness.
 _GIVEN_WAY = 0.75
 # The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
@@ -105,7 +106,9 @@ def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
         for state in solved.states:
             pressure = state.scalars.get(law.pressure_name, state.scalars.get("touching_pressure", 0.0))
-            given = law.smoothing + pressure / law.stiffness + _BETWEEN * apart + law.allowance(state.number) * at_rest
+            most = _OWN * 2 * apart if law.one == law.other else np.inf
+            give = np.min([pressure / law.stiffness, state.scalars.get("touching_depth", np.inf), most])
+            given = law.smoothing + float(give) + _BETWEEN * apart + law.allowance(state.number) * at_rest
             yield RunCheck(f"{law.one} in {law.other}", depth(state.points), given, "mm", state.number)
 
 
@@ -286,15 +289,11 @@ def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """Self-penetration of the muscle's surface where there is none at rest; where it touches itself, up to the give of contact."""
-    triangles, law, none = run.surface.triangles, touching.among(problem.effects), np.zeros(len(run.numbers))
-    gives = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
-    gives += _CREASE * spacing(run.surface)
-    at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))
+    surface, law, none = run.surface, touching.among(problem.effects), np.zeros(len(run.numbers))
+    pressure = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
+    most = _OWN * (apart := spacing(surface))
+    gives = np.minimum(pressure, np.nan_to_num(run.scalars.get("touching_depth", none + most)).clip(max=most))
+    gives += _CREASE * apart
     for i, number in _states(run, ()):
-        pairs = self_crossings(run.surface.moved_to(run.positions[i]))
-        new = pairs[~np.isin(triangles[pairs], at_rest()).any(axis=(1, 2))] if len(pairs) else pairs
-        one, other = np.swapaxes(run.positions[i][triangles[new]], 0, 1)
-        reach = overlaps(one, other)
-        worst = [np.argmax(reach)] if len(reach) else []
-        values, places = (reach[worst], one[worst, 0]) if len(reach) else (np.zeros(1), run.positions[i][:1])
-        yield _at("the muscle through itself", values, gives[[i]], number, places)
+        depth, place = through_itself(surface.moved_to(run.positions[i]), surface)
+        yield _at("the muscle through itself", np.array([depth]), gives[[i]], number, place[None])

@@ -13,9 +13,10 @@ class MuscleContact(Interaction):
     """A pressure of the gap between two muscles, on both alike, or between places of a single one, with any sliding; see
     ``fem_reference.problems.touching.Touching`` for the law.
 
-    ``stiffness`` [MPa/mm]: under the pressure p the two overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
-    which contact begins, and the largest overlap of two muscles at rest. ``friction``: the coefficient of Coulomb's law, greater
-    than 0; without it contact is frictionless. Several muscles touch each other, and none touches itself.
+    ``stiffness`` [MPa/mm]: under the pressure p the two, or the two places, overlap by at most p / stiffness. ``smoothing`` [mm]:
+    the distance below which a muscle is felt, and the most by which it may overlap another, or itself, at rest. ``friction``: the
+    coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Several muscles touch each other, and none
+    touches itself.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}

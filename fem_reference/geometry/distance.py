@@ -6,11 +6,14 @@ from typing import NamedTuple
 import igl
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, normals
 
 # The distance of the sample point outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
+# So many triangles within another part, those farthest from what is not, are measured.
+_WITHIN = 16
 
 
 class Distances(NamedTuple):
@@ -105,6 +108,25 @@ def outer_windings(surface: Surface) -> Floats:
         return np.full(len(triangles), np.nan)
     outside = corners.sum(axis=1) / 3 + step * across / np.where(sizes > 0, sizes, 1)[:, None]
     return np.where(sizes > 0, np.round(igl.fast_winding_number(points, triangles, outside)), np.nan)
+
+
+def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
+    """The greatest depth [mm] of a middle of the triangles ``some`` (m,) within another part of the closed ``surface``, at least:
+    its distance from the nearest triangle behind which it is and that faces it. 0 where the surface goes nowhere through itself.
+    """
+    corners = surface.points[surface.triangles]
+    middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5
+    within = np.flatnonzero(covered & some)
+    if not len(within):
+        return 0.0
+    slack, sizes = _STEP * diagonal(surface.points), np.linalg.norm(across, axis=1)
+    away = cKDTree(middles[~covered]).query(middles[within])[0] if not covered.all() else np.zeros(len(within))
+    found = [0.0]
+    for one in within[np.argsort(-away, kind="stable")[:_WITHIN]]:
+        walls = (across @ across[one] < 0) & (np.vecdot(middles[one] - middles, across) < slack * sizes)
+        facing = Surface(surface.points, surface.triangles[walls])
+        found.append(float(distances(middles[[one]], facing).distance[0]) if walls.any() else 0.0)
+    return max(found)
 
 
 def farthest_points(points: Floats, count: int) -> Ints:

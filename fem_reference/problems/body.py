@@ -230,6 +230,13 @@ class Body:
         return any(one is not None for one in self.frictions)
 
     @property
+    def remembers(self) -> bool:
+        """True where what touches depends on the states before: with friction, and where a part touches itself, as only what was
+        in front of it does.
+        """
+        return self.rubs or any(law.one == law.other for law in self.touching)
+
+    @property
     def frictions(self) -> list[float | None]:
         """The coefficients of friction of contact and of each pair of touching parts, None without."""
         own = [self.contact.friction] if self.contact else []

@@ -56,7 +56,7 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(map(str, body.mesh.facets))}")
     _check_regions(body.mesh, tuple(used))
-    check_touching(body.touching, body.mesh.cells, body.mesh.facets)
+    check_touching(body.touching, body.mesh.cells, body.mesh.facets, moved=body.start is not None)
     _check_needs(body)
     check_agreement(body)
     _check_start(body)

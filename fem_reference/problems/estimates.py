@@ -72,7 +72,8 @@ class Decision:
     def why(self) -> str:
         """The decision in words."""
         if self.indicator is None:
-            return "kept, part of the material"
+            pressing = isinstance(self.effect, Interaction)
+            return "kept, as no estimate tells what meets" if pressing else "kept, part of the material"
         return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:

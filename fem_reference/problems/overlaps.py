@@ -2,11 +2,13 @@
 and the skin beyond their rims.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
-from fem_reference.geometry.distance import distances, inside
+from fem_reference.geometry.distance import depth_within, distances, inside
 from fem_reference.geometry.intersections import crossings, overlaps, self_crossings
 from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
@@ -23,15 +25,16 @@ def overlap(body: Body, law: Touching) -> float:
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
     """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm], at least: the greatest of a
-    corner of either below the skin of the other's piece, and of facets that cross; of a part with itself, of these alone. Curved
-    facets count by their corners, less what they bulge.
+    corner of either below the skin of the other's piece, and of facets that cross; of a part with itself, of the middle of a facet
+    within the whole skin, and of facets of the part that cross this. Curved facets count by their corners, less what they bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
     if law.one == law.other:
-        own = Surface(points, triangles[_among(facets, one)[owner]])
-        crossed = (points[own.triangles[some]] for some in self_crossings(own).T)
-        return float(overlaps(*crossed).max(initial=0.0)) - _bulge(mesh, points, one)
+        skin, own = Surface(points, triangles), _among(facets, one)[owner]
+        pairs = self_crossings(skin)
+        crossed = (points[triangles[some]] for some in pairs[own[pairs].any(axis=1)].T)
+        return max(float(overlaps(*crossed).max(initial=0.0)), depth_within(skin, own)) - _bulge(mesh, points, one)
     piece = _pieces(mesh)
     depths, parts = [0.0], list[Surface]()
     for part, against in ((one, other), (other, one)):
@@ -43,6 +46,26 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
         crossed = (points[part.triangles[some]] for part, some in zip(parts, pairs.T, strict=True))
         depths.append(overlaps(*crossed).max())
     return float(max(depths)) - _bulge(mesh, points, np.concatenate([one, other]))
+
+
+def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
+    """The depth [mm] to which a surface ``now`` goes through itself, at least, and its place (3,), away from vertices that do so at
+    ``rest``; triangles that cross show less than a side that is within another, which is measured where there are none at rest.
+    """
+    pairs, known = self_crossings(now), _crossing(rest)
+    new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))] if len(pairs) else pairs
+    if not len(new):
+        return 0.0, now.points[0]
+    one, other = np.swapaxes(now.points[now.triangles[new]], 0, 1)
+    reach = overlaps(one, other)
+    within = 0.0 if len(known) else depth_within(now, np.full(len(now.triangles), True))
+    return max(float(reach.max()), within), one[np.argmax(reach), 0]
+
+
+@lru_cache(maxsize=8)
+def _crossing(surface: Surface) -> Ints:
+    """The vertices (k,) at which a surface goes through itself."""
+    return np.unique(surface.triangles[self_crossings(surface)])
 
 
 def longest_edge(mesh: Cells, law: Touching) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from math import isfinite
 
 import numpy as np
@@ -19,7 +20,8 @@ class Touching:
     facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
     ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
-    an overlap at rest is removed, as that with bones is.
+    an overlap at rest is removed, as that with bones is; None: that of two parts presses at once, that of a part with itself never,
+    until it comes apart.
     """
 
     one: str
@@ -61,9 +63,10 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
     return () if law is None else (Touching(part, part, law.stiffness, law.smoothing, law.friction),)
 
 
-def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints]) -> None:
+def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
     """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k).
+    separate pieces of the mesh of ``cells`` (m, k); or are one, in a body that does not begin ``moved``. No pair of
+    facets may have two laws.
     """
     if not touching:
         return
@@ -75,3 +78,19 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
         if law.one != law.other and len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
             got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
+        if law.one == law.other and moved:  # what was in front of what is not known
+            raise InputError(
+                "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
+            )
+    _check_pairs(touching, facets)
+
+
+def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints]) -> None:
+    """Raise InputError where a pair of facets is under two laws, whose pressures would add up."""
+    names = {name for law in touching for name in (law.one, law.other)}
+    own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
+    for (i, law), (j, other) in combinations(enumerate(touching), 2):
+        for one, two in ((other.one, other.other), (other.other, other.one)):
+            if own[law.one] & own[one] and own[law.other] & own[two]:
+                got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
+                raise InputError(f"touching[{j}]", got, "one law for a pair of facets")

@@ -220,7 +220,7 @@ class Bench[C: Case]:
             origin["mesh"] = self._problem().mesh_facts
         identity = {"name": wanted.name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
         offer = wanted.offer
-        keeps = offer.go_on is not None and not (given.body is not None and given.body.rubs)
+        keeps = offer.go_on is not None and not (given.body is not None and given.body.remembers)
         writer = Writer(wanted.folder, identity, given.rest, anew=not keeps)
 
         def solve(sink: Sink) -> Outcome:

@@ -48,12 +48,13 @@ _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
-def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
+def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touched: bool = True) -> dict[str, Vary]:
     """Changes by name that each halve one cause of numerical error beside tetrahedra: the compliance and smoothing of contact, and
-    the error and rounding of distances to bones, unless no bone ``pressed``; load steps, where the ``settings`` have them, with
-    drag, viscosity or friction only: else a state does not depend on them.
+    the error and rounding of distances to bones, unless no bone ``pressed``, or the muscle never ``touched`` itself; load steps,
+    where the ``settings`` have them, with drag, viscosity or friction only: else a state does not depend on them.
     """
-    found, bones, itself = dict[str, Vary](), among(case.effects) if pressed else None, touching.among(case.effects)
+    found, bones = dict[str, Vary](), among(case.effects) if pressed else None
+    itself = touching.among(case.effects) if touched else None
     laws = [(name, law) for name, law in (("contact", bones), ("contact with itself", itself)) if law is not None]
     for name, law in laws:
         found[f"{name} stiffness"] = partial(with_contact, kind=type(law), stiffness=2 * law.stiffness)
@@ -125,10 +126,11 @@ def stored(reference: Run) -> ErrorBars | None:
 
 
 def needed(bench: Bench[MuscleCase], reference: Run) -> dict[str, Vary]:
-    """The variations of a reference: where no bone pressed in it, the stiffness of contact changes nothing."""
-    area = reference.scalars.get("contact_area")
+    """The variations of a reference: where nothing pressed in it, the stiffness of contact changes nothing."""
+    areas = [reference.scalars.get(f"{name}_area") for name in ("contact", "touching")]
+    pressed, touched = (area is None or bool(np.nanmax(area) > 0) for area in areas)
     settings = bench.settings(bench.scene.reference, "reference")
-    return variations(bench.scene, settings, pressed=area is None or bool(np.nanmax(area) > 0))
+    return variations(bench.scene, settings, pressed=pressed, touched=touched)
 
 
 def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:

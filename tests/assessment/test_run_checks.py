@@ -221,12 +221,24 @@ def test_a_surface_through_itself(tmp_path) -> None:
     through = np.array(resting(problem).positions)
     through[3, side] -= [12.0, 0.0, 0.0]
     assert lost(problem, replace(resting(problem), positions=through)) == ["the muscle through itself"]
-    # Where it touches itself it may be as deep as the recorded pressure allows: here 10 MPa over 0.1 MPa/mm.
+    # Where it touches itself it may be as deep as the recorded pressure allows, here 10 MPa over 0.1 MPa/mm, but neither deeper
+    # than is recorded nor than a share of the distance between points.
     touches = replace(problem, effects=(*problem.effects, effects.make("touching", stiffness=0.1, smoothing=0.1)))
     run = replace(resting(touches), positions=through)
-    for pressure, names in ((0.0, ["the muscle through itself"]), (10.0, []), (np.nan, ["the muscle through itself"])):
-        recorded = run.scalars | {"touching_pressure": np.full(len(run.numbers), pressure)}
-        assert lost(touches, replace(run, scalars=recorded)) == names
+    slightly = np.array(resting(problem).positions)
+    slightly[3, side] -= [10.3, 0.0, 0.0]
+    wrong = ["the muscle through itself"]
+    for shape, pressure, deep, names in (
+        (through, 10.0, 12.0, wrong),
+        (slightly, 0.1, 0.5, []),
+        (slightly, 0.0, 0.5, wrong),
+        (slightly, 0.1, 0.0, wrong),
+        (slightly, np.nan, 0.5, wrong),
+        (slightly, 0.1, np.nan, wrong),
+    ):
+        scalars = {"touching_pressure": pressure, "touching_depth": deep}
+        recorded = run.scalars | {name: np.full(len(run.numbers), value) for name, value in scalars.items()}
+        assert lost(touches, replace(run, positions=shape, scalars=recorded)) == names
 
 
 def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:

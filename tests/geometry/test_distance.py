@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.distance import distances, farthest_points, flattened, inside, outer_windings
+from fem_reference.geometry.distance import depth_within, distances, farthest_points, flattened, inside, outer_windings
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 CUBE = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))
@@ -133,3 +133,14 @@ def test_a_flat_triangle_is_off_a_round_surface_by_its_edges() -> None:
     points = np.vstack([np.eye(3), 2 * np.eye(3)[:1]]) / np.sqrt(2)
     surface = Surface(points, np.array([[0, 1, 2], [1, 2, 3]]))
     assert flattened(surface, np.array([0.0, 0.4, 0.4])) == pytest.approx(10 * (10 - np.sqrt(100 - 1 / 3)), rel=1e-3)
+
+
+@pytest.mark.parametrize("deep", [0.6, 0.1, 0.0, -0.1])
+def test_a_surface_is_as_deep_within_itself_as_it_was_pushed(deep: float) -> None:
+    # Two cubes of 2 mm as one surface, askew in their plane: the middles of facets that face each other are in the planes.
+    count, above = len(CUBE.points), CUBE.points + [0.313, 0.217, 2.0 - deep]
+    both = Surface(np.concatenate([CUBE.points, above]), np.concatenate([CUBE.triangles, CUBE.triangles + count]))
+    every = np.full(len(both.triangles), True)
+    assert depth_within(both, every) == pytest.approx(max(deep, 0.0), abs=1e-9)
+    assert depth_within(both, ~every) == 0
+    assert depth_within(CUBE, every[: len(CUBE.triangles)]) == 0

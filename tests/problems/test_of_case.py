@@ -7,8 +7,9 @@ import pytest
 import small
 from auto_scenes import CONTACT, WEIGHT, scene_of
 
+from fem_reference.effects import make as make_effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.problems import muscle, of_case
+from fem_reference.problems import estimates, muscle, of_case
 from fem_reference.problems.scalar import FieldProblem, build
 from fem_reference.report.overview import case_facts
 from fem_reference.report.sections import origin
@@ -28,6 +29,9 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert "Gravity: left out" in str(kept[0].decisions[2])
     assert "Gravity: needed" in str(kept[1].decisions[2])
     assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
+    itself = make_effect("touching", stiffness=0.1, smoothing=0.1)
+    decided = estimates.Decision(itself, needed=True, indicator=None, bound=0.1, stress_bound=0.1)
+    assert str(decided) == "MuscleContact: kept, as no estimate tells what meets"
 
 
 def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:

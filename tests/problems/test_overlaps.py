@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapes
 
 import fem_reference as fr
+from fem_reference.foundations.mesh import Surface
 from fem_reference.problems.body import Cells
-from fem_reference.problems.overlaps import overlap
+from fem_reference.problems.overlaps import overlap, through_itself
 
 LAW = fr.Touching("low_z1", "high_z0", 2.0, 0.1)
 
@@ -55,3 +57,25 @@ def test_curved_facets_count_less_their_bulge() -> None:
     bent = np.array(high.points)
     bent[:, 2] += 0.05 * np.isclose(bent[:, 0] / 0.2 % 1, 0.5) * (bent[:, 2] < 0.1)
     assert depth(low, moved(replace(high, points=bent), 0.0, 0.0, 0.35)) == pytest.approx(0.15 - 0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize("deep", [0.15, 0.25])
+def test_parts_of_one_overlap_by_what_they_are_pushed(deep) -> None:
+    """As two parts do, however small the facets are; and a part by its depth in all of the skin."""
+    low, high = (fr.box((4, 4, 4), (0.4, 0.4, 0.5), "tetrahedron") for _ in range(2))
+    mesh = fr.joined({"low": low, "high": moved(high, 0.01, 0.02, 0.5 - deep)})
+    facets = np.concatenate([mesh.facets[f"{name}_{face}"] for name in ("low", "high") for face in low.facets])
+    for part in (facets, mesh.facets["high_z0"]):
+        body = fr.Body(replace(mesh, facets={"part": part}), (), (), (0.0, 1.0))
+        assert overlap(body, fr.Touching("part", "part", 2.0, 0.1)) == pytest.approx(deep, abs=1e-9)
+
+
+def test_a_surface_is_through_itself_by_what_it_was_pushed_since_rest() -> None:
+    cube = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))
+    count, apart = len(cube.points), cube.points + [0.3, 0.2, 2.1]
+    rest = Surface(np.concatenate([cube.points, apart]), np.concatenate([cube.triangles, cube.triangles + count]))
+    upper = (np.arange(2 * count) >= count)[:, None]
+    for push, deep in ((0.0, 0.0), (0.3, 0.2), (0.8, 0.7)):
+        now = rest.moved_to(rest.points - push * upper * [0, 0, 1.0])
+        assert through_itself(now, rest)[0] == pytest.approx(deep, abs=1e-9)
+        assert through_itself(now, now)[0] == 0

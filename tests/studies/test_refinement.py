@@ -12,6 +12,7 @@ import stand_ins
 
 from fem_reference import cli, metrics, report
 from fem_reference.assessment import error_bars
+from fem_reference.effects import make as make_effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.report import gallery, pages
@@ -308,3 +309,12 @@ def test_with_friction_a_state_depends_on_load_steps() -> None:
     assert "load steps" not in refinement.variations(case, Settings())
     assert "load steps" in refinement.variations(rubbed, Settings())
     assert "load steps" not in refinement.variations(rubbed, Settings(), pressed=False)
+
+
+def test_contact_of_a_muscle_with_itself_is_a_cause_of_error_where_it_touched() -> None:
+    case = casefile.read("hip_flexion")
+    law = make_effect("touching", stiffness=0.1, smoothing=0.1)
+    case = case.model_copy(update={"effect": (*case.effect, law)})
+    own = {"contact with itself stiffness", "contact with itself smoothing"}
+    assert own <= set(refinement.variations(case, Settings()))
+    assert not own & set(refinement.variations(case, Settings(), touched=False))

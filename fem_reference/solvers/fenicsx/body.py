@@ -42,7 +42,7 @@ class AssembledBody:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
-        self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.rubs, body.effects
+        self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
         self.conserves = not any(changed)  # True where no energy changes without deformation of the body
         self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved

@@ -30,11 +30,11 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """The states to continue from; all other files that an earlier process left in the folder are removed. With friction there are
-    none, as the places that hold points are not kept.
+    """The states to continue from; all other files that an earlier process left in the folder are removed. There are none where
+    contact depends on the states before (``Body.remembers``), which are not kept.
     """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
-    frames = tuple(number for number in cut_off.numbers if not body.rubs and _is_of(whole, number))
+    frames = tuple(number for number in cut_off.numbers if not body.remembers and _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)
     for path in cut_off.folder.iterdir():
         if path not in {whole.place(number) for number in frames}:

@@ -23,8 +23,8 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
-# The unknowns (n,) of a search, what each pass met, and its friction.
-State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None]]
+# The unknowns (n,) of a search, what each pass met, its friction, and the shares of overlaps at rest that were subtracted.
+State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
 
 class TouchingForces:
@@ -46,7 +46,7 @@ class TouchingForces:
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
         self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
-        self.settled: State = np.array(self.unknowns.x.array), [], []
+        self.settled: State = np.array(self.unknowns.x.array), [], [], []
         self.move_to(body.frames[0])
         self.settle()
         depths = [
@@ -180,12 +180,14 @@ class TouchingForces:
         if any(self.rubbing):
             self.seen = np.full_like(self.seen, np.nan)  # what holds the points is another
             self.look()
+        for side, (met, _) in zip(self.passes, self.now, strict=True):
+            side.let_fall(met)
         self.settled = self.state
 
     @property
     def state(self) -> State:
         """The contact at the unknowns of the last search, which determines the facets that points stay on in the next."""
-        return self.seen, self.now, self.rubbed
+        return self.seen, self.now, self.rubbed, self.acting()
 
     def restoring(self) -> Callable[[], None]:
         """A function that restores the present state, as the unknowns have been."""
@@ -193,7 +195,9 @@ class TouchingForces:
 
     def go_back(self, state: State | None = None) -> None:
         """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
-        self.seen, self.now, self.rubbed = state or self.settled
+        self.seen, self.now, self.rubbed, shares = state or self.settled
+        if shares != self.acting():  # its pressures are those of another frame
+            self.seen = np.full_like(self.seen, np.nan)
 
     def trouble(self, before: Floats, /) -> Trouble | None:
         """Diverged where a point went through the other part since the unknowns ``before`` (n,), past its rim or too far."""

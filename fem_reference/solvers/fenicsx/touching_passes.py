@@ -23,6 +23,7 @@ _STAYS = 0.05
 _FACING = -0.5
 # Of a part with itself, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
 _DEEP = 0.125
+_AT_ONCE = 100000  # pairs whose paths are followed together
 _BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
 
 
@@ -106,7 +107,7 @@ class Pass:
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
-        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), nodes)
+        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), 0 * points[:, 0], nodes)
         some, facets = self._beside(nodes, points, some, facets, most)
         some, facets = self._outside(some, facets, settled or (unknowns, None))
         there = self.other.nearest(nodes, facets, points[some])
@@ -141,15 +142,17 @@ class Pass:
         kept = (height > -least - bulge[facets]) | held
         return some[kept], facets[kept]
 
-    def _near(self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm]; of a part with itself only those
-        that may touch each other (``OwnPairs.near``).
+    def _near(
+        self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, more: Floats, *states: Floats
+    ) -> tuple[Ints, Ints]:
+        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm] and what a point reaches ``more``
+        (n,); of a part with itself only those that may touch each other (``OwnPairs.near``), in whose balls points stay.
         """
         if self.own is None:
-            return pairs(points, balls[0], reach)
+            return pairs(points, balls[0], reach + more.max())
         one, facets = self.own.near(balls, reach, *states)
         some, facets = (one[:, None] * self.each + np.arange(self.each)).ravel(), np.repeat(facets, self.each)
-        close = np.linalg.norm(points[some] - balls[0][facets], axis=1) <= reach[facets]
+        close = np.linalg.norm(points[some] - balls[0][facets], axis=1) <= reach[facets] + more[some]
         return some[close], facets[close]
 
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
@@ -175,6 +178,15 @@ class Pass:
         at rest is subtracted.
         """
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
+
+    def let_fall(self, met: Met) -> None:
+        """Subtract no more than what leaves the points that ``met`` the other side without pressure, nothing of others; of a part
+        with itself, whose shift at rest is not removed: points that have come apart press as others do when they meet again.
+        """
+        if self.own and self.law.relaxed is None:
+            left = np.zeros_like(self.overlaps)
+            left[met.points] = np.maximum(self.law.smoothing - met.gap, 0)
+            self.overlaps = np.minimum(self.overlaps, left)
 
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
@@ -232,15 +244,17 @@ class Pass:
         shift = (new - old).mean(axis=(0, 1))  # what all do together changes nothing
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
-        longest = np.linalg.norm(ends - starts, axis=1).max() / 2
+        far = np.linalg.norm(ends - starts, axis=1) / 2
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2
-        some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii + longest, old, new)
+        some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii, far, old, new)
         some, facets = some[free[some]], facets[free[some]]
-        pieces = self.pieces[facets]
-        each, which = pieces.shape[1], facets[:, None, None]
-        corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
-        points = np.repeat(some, each)
-        return np.unique(points[passed(starts[points], ends[points], *corners)])
+        lost = [np.zeros(0, np.int64)]
+        for part in np.array_split(np.arange(len(some)), len(some) // _AT_ONCE + 1):
+            pieces = self.pieces[facets[part]]
+            which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
+            corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
+            lost.append(points[passed(starts[points], ends[points], *corners)])
+        return np.unique(np.concatenate(lost))
 
 
 def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:

@@ -1,12 +1,14 @@
 """States to go on from: those of this mesh; anything else in the folder is removed."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 
 from fem_reference.foundations.mesh import fingerprint
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body
+from fem_reference.problems.touching import Touching
 from fem_reference.runs.states import write_arrays
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.fenicsx.jobs import kept
@@ -29,6 +31,15 @@ def test_states_of_this_mesh_are_gone_on_from(tmp_path) -> None:
     assert found.frames == (0, 5)
     assert found.place(5).is_file()
     assert not (tmp_path / "strange.txt").exists()
+
+
+def test_states_whose_contact_depends_on_those_before_are_not_gone_on_from(tmp_path) -> None:
+    laws = {"itself": Touching("z1", "z1", 1.0, 0.1), "friction": Touching("z1", "z0", 1.0, 0.1, friction=0.2)}
+    laws["two parts"] = replace(laws["friction"], friction=None)
+    for name, law in laws.items():
+        left(tmp_path, 0)
+        found = kept(CutOff(tmp_path, (0,)), replace(BODY, touching=(law,)))
+        assert found.frames == ((0,) if name == "two parts" else ())
 
 
 def test_states_of_something_else_are_removed(tmp_path) -> None:

@@ -113,6 +113,32 @@ def test_at_rest_no_body_feels_itself_however_thin_it_becomes() -> None:
     assert contact.scalars()["touching_points"] > 100
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.03, 0.06])
+def test_what_lies_close_at_rest_presses_as_all_does_once_it_has_come_apart(gap) -> None:
+    """The smoothing is 0.05 mm. Deeper points press at once, those that open by 0.01 mm at 0.01 mm less, and those that open
+    farther as if they had been apart at rest: k times the depth.
+    """
+    low, high = (
+        shapes.box((2, 2, 1), (1.0, 1.0, 0.5), "hexahedron"),
+        shapes.box((1, 1, 1), (0.8, 0.8, 0.5), "hexahedron"),
+    )
+    mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0.1, 0.1, 0.5 + gap])})
+    both = np.concatenate([mesh.facets["low_z1"], mesh.facets["high_z0"]])
+    law = Touching("both", "both", 1.0, 0.05)
+    contact, displacement = assembled(replace(mesh, facets=mesh.facets | {"both": both}), law, "Q1/P0")
+    places = displacement.space.tabulate_dof_coordinates()
+    upper = displacement.dofs[np.isin(np.round(places[:, 0], 9), [0.1, 0.9])]
+    pressures = []
+    for opened in (0.0, 0.01, 0.2):
+        for height in (opened, -0.1 - gap):  # the gap is then -0.1 mm
+            contact.unknowns.x.array[upper] = [0.0, 0.0, height]
+            contact.settle() if height == opened else contact.look()
+        pressures.append(contact.scalars()["touching_pressure"])
+    closed = [0.1 - max(0.05 - gap - up, 0.0) for up in (0.0, 0.01, 0.2)]
+    wanted = [law.pressure(np.array([-depth]))[0][0] for depth in closed]
+    assert pressures == pytest.approx(wanted, abs=1e-12)
+
+
 @pytest.mark.slow
 def test_arms_that_close_do_not_cross_and_forces_balance(fem_lab) -> None:
     mesh, settings = letter_c("hexahedron"), {"first_step": 0.25, "residual": 1e-10}

@@ -139,6 +139,23 @@ def test_overlap_at_rest_is_refused(fem_lab) -> None:
     assert 'at rest: "low_z1" and "high_z0" overlap by 0.1 mm' in outcome.message
 
 
+def test_an_overlap_at_rest_is_removed_beside_a_plate_that_is_only_met_then(fem_lab) -> None:
+    """What is solved without the plate and then discarded leaves no pressures. The plate is 0.005 mm above the upper block and as
+    stiff as contact of the two: rigid ones would share what is left, 0.095 mm, and these give way as well.
+    """
+    plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.905), (0.0, 0.0, -1.0)), at_rest)
+    hold = Prescribed("hold", "high_z1", (0, 1, 2), moved(0.0, 0.0, 0.0), stiffness=1e-3)
+    law = replace(LAW, stiffness=0.1, relaxed=(0.0, 1.0))
+    body = pair(block((1, 1, 1)), placed(block((1, 1, 1)), 0.0, 0.0, 0.4), 0.0, 0.0, 0.0, law=law)
+    body = replace(body, prescribed=(*parts.clamped("low_z0"), hold), contact=ContactLaw("high_z1", 0.1, 0.002))
+    run = solved(fem_lab, replace(body, bones=(plate,)), residual=1e-11)
+    assert run.outcome.status == "converged"
+    forces = {name: force[2] for name, force in run.last.forces.items()}
+    assert 0.005 < run.last.scalars["touching_depth"] < 0.0475
+    assert forces["low_z1 on high_z0"] > 1e-3
+    assert forces["low_z1 on high_z0"] == pytest.approx(-forces["plate"] - forces["hold"], abs=1e-10)
+
+
 @pytest.mark.parametrize(("deep", "status"), [(0.0, "converged"), (0.15, "diverged")])
 def test_overlap_at_rest_is_refused_where_it_is_deeper_than_facets_are_wide(deep, status, fem_lab) -> None:
     # Facets of 0.1 mm: no point meets one that is 0.15 mm above it.
