@@ -25,10 +25,12 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     if not problem.apart:
         return ()
     checks, none = list[RunCheck](), np.zeros(len(run.numbers))
+    alone = run.scalars.get("touching_pressure", none) if len(problem.pairs) == 1 else none
     for pair in combinations(problem.spans, 2):
         own = pressure_name(*(called(span.name, "free") for span in pair))
         touch = (pair[0].name, pair[1].name) in problem.pairs
-        pressures = np.nan_to_num(run.scalars.get(own, run.scalars.get("touching_pressure", none)) if touch else none)
+        pressures = run.scalars.get(own, alone) if touch else none
+        pressures = np.where(np.isfinite(pressures), pressures, 0.0)
         skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
         edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
         law = problem.law

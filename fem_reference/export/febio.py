@@ -73,11 +73,21 @@ def write_model(root: Element, folder: Path) -> None:
     files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
+def units(first: float) -> str:
+    """The units of a file whose motion begins at the frame ``first``."""
+    return f"mm, N, MPa; time is the frame number minus {first}"
+
+
+def comment(text: str) -> Element:
+    """The ``text`` as a comment of the file."""
+    return ElementTree.Comment(f" {text.replace('--', '- -')} ")  # two hyphens would end it
+
+
 def model(problem: MuscleProblem) -> Element:
     """The whole input file."""
     root = Element("febio_spec", version="4.0")
-    for text in (f"mm, N, MPa; time is the frame number minus {problem.frames[0]}", *notes(problem)):
-        root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))  # two hyphens would end it
+    for text in (units(problem.frames[0]), *notes(problem)):
+        root.append(comment(text))
     SubElement(root, "Module", type="solid")
     _control(root, problem)
     add_materials(root, problem)

@@ -3,6 +3,7 @@
 from xml.etree.ElementTree import Element
 
 from fem_reference.export import febio, febio_contact, febio_mesh
+from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.problems.muscles import MusclesProblem
 
 # What names something, and what refers to it: attributes, and tags of texts.
@@ -27,10 +28,11 @@ def model(problem: MusclesProblem) -> Element:
         mesh.surface(_found(own, "Mesh"), "touching", "tri6", mesh.curved(one.body.mesh.facets["free"]))
         _renamed(own, name, before)
         for section in own:
-            if section.tag in sections:
+            if section.tag in sections:  # comments are made of all muscles, below
                 _add(sections[section.tag], section)
-            else:  # a comment, on this muscle
-                root.append(section)
+    first = next(iter(problem.problems.values()))
+    for text in (febio.units(first.frames[0]), *notes(problem)):
+        root.append(febio.comment(text))
     _touch(sections, problem)
     sections["Mesh"][:] = sorted(sections["Mesh"], key=lambda one: one.tag not in _FIRST)
     root.extend(one for one in sections.values() if len(one) or one.attrib)
@@ -84,8 +86,8 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
     if not problem.pairs:
         return
     assert problem.law is not None  # or no two may touch
-    for one, other in problem.pairs:
-        name = f"{one}_{other}"
+    for k, (one, other) in enumerate(problem.pairs):
+        name = f"touching_{k}_{one}_{other}"
         febio_mesh.Mesh.pair(sections["Mesh"], f"{name}_pair", f"{one}_touching", f"{other}_touching")
         settings = {"penalty": problem.law.stiffness / 2, "search_radius": febio_contact.SEARCH_RADIUS, "two_pass": 1}
         friction = {"fric_coeff": problem.law.friction or 0.0}
@@ -98,5 +100,11 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
 def notes(problem: MusclesProblem) -> list[str]:
     """Differences of the model in FEBio, by muscle, and of the contact between muscles."""
     own = [f"{name}: {text}" for name, one in problem.problems.items() for text in febio_contact.notes(one)]
-    law = "linear from the surface on, without smoothing; an overlap at rest is removed at once"
-    return own + [f"{one} and {other} touch by FEBio's law: {law}" for one, other in problem.pairs]
+    between = list[str]()
+    for one, other in problem.pairs:
+        depth, _ = penetration(*(skin_of(problem.problems[name].mesh) for name in (one, other)))
+        rest = (
+            f"an overlap of {depth:.2g} mm at rest is removed at once" if depth > 0 else "they do not overlap at rest"
+        )
+        between.append(f"{one} and {other} touch by FEBio's law: linear from the surface on, without smoothing; {rest}")
+    return own + between

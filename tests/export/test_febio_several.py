@@ -89,13 +89,16 @@ def test_each_muscle_is_where_it_is_alone(feb: Element, problem: MusclesProblem)
 
 def test_the_muscles_touch_by_the_surfaces_that_are_not_attached(feb: Element, problem: MusclesProblem) -> None:
     """Both sides of a muscle have half the stiffness in the reference: two passes of half the penalty."""
-    (pair,) = [one for one in feb.iter("SurfacePair") if one.get("name") == "deep_superficial_pair"]
+    (pair,) = [one for one in feb.iter("SurfacePair") if one.get("name") == "touching_0_deep_superficial_pair"]
     assert [one.text for one in pair] == ["deep_touching", "superficial_touching"]
     (contact,) = [one for one in feb.iter("contact") if one.get("surface_pair") == pair.get("name")]
     assert contact.get("type") == "sliding-elastic"
     settings = {one.tag: one.text for one in contact}
     assert (settings["two_pass"], float(settings["penalty"]), settings["laugon"]) == ("1", 0.5 / 2, "0")
     assert float(settings["fric_coeff"]) == 0
+    said = [one.text for one in febio_several.model(problem).iter(ElementTree.Comment)]
+    assert sum("mm, N, MPa" in text for text in said) == 1
+    assert any("deep and superficial touch by FEBio's law" in text for text in said)
     at = nodes(feb)
     for name in NAMES:
         (surface,) = [one for one in feb.iter("Surface") if one.get("name") == f"{name}_touching"]
@@ -110,7 +113,7 @@ def test_muscles_that_rub_rub_in_febio(problem: MusclesProblem) -> None:
     assert problem.law is not None
     rubbing = replace(problem, law=problem.law.model_copy(update={"friction": 0.3}))
     contacts = {one.get("surface_pair"): one for one in febio_several.model(rubbing).iter("contact")}
-    assert {one.tag: one.text for one in contacts["deep_superficial_pair"]}["fric_coeff"] == "0.3"
+    assert {one.tag: one.text for one in contacts["touching_0_deep_superficial_pair"]}["fric_coeff"] == "0.3"
 
 
 def test_each_muscle_has_a_folder_that_is_complete(folder: Path) -> None:
