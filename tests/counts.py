@@ -194,12 +194,13 @@ LINES = 36_000
 ADDED = {
     "forces and moment arms, Hill's muscle, decompositions into fibres, estimation, rbf_muscle, viper": 3550,
     "experiments, credibility, tension at rest, unknown parameters, calibration": 3940,
+    "fibres by area, their ends on bones": 490,
     "regions, membranes, tendons that pull": 880,
     "contact between parts of the surface": 740,
-    "several muscles in one scene": 1080,
+    "several muscles in one scene": 1200,
     "exports of several muscles, the depth of muscles in each other": 250,
-    "friction": 590,
-    "contact of a part with itself": 130,
+    "friction": 690,
+    "contact of a part with itself": 220,
     "own solvers as commands, load of the machine, answers first": 880,
     "laws of other people's solvers, split errors, standings": 700,
 }

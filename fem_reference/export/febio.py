@@ -5,6 +5,7 @@ write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is 
 frame number minus the first.
 """
 
+from collections.abc import Iterable
 from math import ceil
 from pathlib import Path
 from xml.etree import ElementTree
@@ -78,16 +79,16 @@ def units(first: float) -> str:
     return f"mm, N, MPa; time is the frame number minus {first}"
 
 
-def comment(text: str) -> Element:
-    """The ``text`` as a comment of the file."""
-    return ElementTree.Comment(f" {text.replace('--', '- -')} ")  # two hyphens would end it
+def add_comments(root: Element, texts: Iterable[str]) -> None:
+    """Append each of the ``texts`` as a comment of the file."""
+    for text in texts:
+        root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))  # two hyphens would end it
 
 
 def model(problem: MuscleProblem) -> Element:
     """The whole input file."""
     root = Element("febio_spec", version="4.0")
-    for text in (units(problem.frames[0]), *notes(problem)):
-        root.append(comment(text))
+    add_comments(root, (units(problem.frames[0]), *notes(problem)))
     SubElement(root, "Module", type="solid")
     _control(root, problem)
     add_materials(root, problem)

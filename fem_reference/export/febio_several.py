@@ -31,8 +31,7 @@ def model(problem: MusclesProblem) -> Element:
             if section.tag in sections:  # comments are made of all muscles, below
                 _add(sections[section.tag], section)
     first = next(iter(problem.problems.values()))
-    for text in (febio.units(first.frames[0]), *notes(problem)):
-        root.append(febio.comment(text))
+    febio.add_comments(root, (febio.units(first.frames[0]), *notes(problem)))
     _touch(sections, problem)
     sections["Mesh"][:] = sorted(sections["Mesh"], key=lambda one: one.tag not in _FIRST)
     root.extend(one for one in sections.values() if len(one) or one.attrib)
