@@ -275,9 +275,9 @@ def _fibre_ends_rows() -> str:
     rows = []
     for one in kept("fibre_ends")["measured"]:
         facts, covered = one["facts"], ", ".join(f"{name} {value:.0f}" for name, value in one["covered"].items())
-        words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_on_by_tendon", "")
+        words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_continued_by", "")
         named = [f"{end} of {fibre} {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
-        far = ("by a tendon: " if "fibre_ends_on_by_tendon" in facts else "") + (", ".join(named) or "none")
+        far = ("by a tendon: " if "fibre_ends_continued_by" in facts else "") + (", ".join(named) or "none")
         off = [one["status"] if value is None else f"{value:.1f}" for value in one["off"].values()] or [one["status"]]
         rows.append((f"`{one['case']}`", covered, f"{facts['fibre_ends']:.0f}", far, ", ".join(off)))
     beside, off_bone = "more than 2 mm from their attachment", "worst end off its bone, 0.5, 1 rad, mm"

@@ -80,7 +80,7 @@ class FibreEnds:
         for one, share in zip(self.attached, self.covered, strict=True):
             found[f"{one.attachment}_covered_percent"] = 100 * float(share)
         if tied.any():
-            found |= {"fibre_ends_by_tendon": float(tied.sum()), "fibre_ends_on_by_tendon": self._words(tied)}
+            found |= {"fibre_ends_continued": float(tied.sum()), "fibre_ends_continued_by": self._words(tied)}
         if self.beside.any():
             found["fibre_end_farthest_mm"] = float(self.distance[self.beside].max())
             found["fibre_ends_not_attached"] = self._words(self.beside)
@@ -141,7 +141,9 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The area of the triangles ``part`` (r, 3, 3) within the mean spacing of so many ``fibres`` of ``ends`` (m, 3), as a share."""
+    """The area of the triangles ``part`` (r, 3, 3) within the mean spacing of so many ``fibres`` of ``ends`` (m, 3), as a share:
+    whole triangles, by their centroids, so that it is wrong by up to the area of those that the border of the region cuts.
+    """
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():
         return 0.0

@@ -168,9 +168,9 @@ def check_ends(name: str, facts) -> None:
     if "femur" not in {bone.name for bone in CASES[name].bone}:
         return
     mesh = facts["mesh"]
-    named, tied = (mesh.get(f"fibre_ends_{words}", "").count("of fibre") for words in ("not_attached", "on_by_tendon"))
+    named, tied = (mesh.get(f"fibre_ends_{words}", "").count("of fibre") for words in ("not_attached", "continued_by"))
     assert (named, tied) == (BESIDE.get(name, 0), BY_TENDON.get(name, 0))
-    assert (mesh["fibre_ends_beside"], mesh.get("fibre_ends_by_tendon", 0)) == (named, tied)
+    assert (mesh["fibre_ends_beside"], mesh.get("fibre_ends_continued", 0)) == (named, tied)
     if named + tied == 0:
         assert min(value for key, value in mesh.items() if key.endswith("_covered_percent")) > COVERED
         off = [value for value in rows(facts, "fibre_ends", "max").values() if value is not None]

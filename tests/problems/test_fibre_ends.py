@@ -112,11 +112,11 @@ def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
     found = ends_of_setup(with_tendon([14, 9, 50]), given)
     assert found is not None
     assert not found.beside.any()
-    assert (found.facts["fibre_ends_beside"], found.facts["fibre_ends_by_tendon"]) == (0, 1)
+    assert (found.facts["fibre_ends_beside"], found.facts["fibre_ends_continued"]) == (0, 1)
     assert_allclose(found.beyond(ends_of(given), 0), [0, 5], rtol=1e-12)
     moved = ends_of(given) + [0, 0, 1]
     assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)
-    assert found.facts["fibre_ends_on_by_tendon"] == "last end of fibre 1, of top by its tendon: 5.0 mm"
+    assert found.facts["fibre_ends_continued_by"] == "last end of fibre 1, of top by its tendon: 5.0 mm"
     # 1 mm off the bone that rests, 9 mm off the bone that is lifted by 10, by a tendon or not.
     assert_allclose(found.off(moved, ends_of(given), 5), [[1, 9], [1, 9]], rtol=1e-12)
     lost = np.where(np.arange(3) == 0, np.nan, moved)

@@ -346,7 +346,7 @@ def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
     [
         (
             'nme = "x"',
-            r"candidate\.toml: nme: got an unknown key, want name, or another one of left_out, name, seconds_per_frame, threads",
+            r"candidate\.toml: nme: got an unknown key, want name, or another one of case, group, left_out, name",
         ),
         ('name = "my solver"', r'candidate\.toml: name: got "my solver", want a name of 1 to 100 letters'),
         ('name = ""', r"candidate\.toml: name: got"),

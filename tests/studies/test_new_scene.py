@@ -69,7 +69,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(stl: Path, capsys) -> 
     taken = stl / "taken"
     taken.mkdir()
     for given, want in (
-        (["new", str(taken)], "which is there already"),
+        (["new", str(taken)], "which exists already"),
         (words(stl)[:6], "--bone: got 1 files, want two or more"),
         (words(stl, "--from", "rod"), '--from: got "rod" beside --muscle'),
         (["new", str(stl / "mine"), "--bone", "x.stl"], "--bone: got a bone without --muscle"),

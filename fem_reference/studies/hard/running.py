@@ -179,7 +179,8 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
     hard, muscle = posed.hard, posed.problem.muscle
     if muscle is None or choice.solver != REFERENCE:
         return
-    wanted = hard.steps or (following.farthest(followed) if posed.in_steps and hard.start is None else None)
+    asked = posed.in_steps and hard.start is None and not muscle.body.rubs  # with friction the end depends on the path
+    wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
         yield following.in_steps(muscle, choice, wanted)
     if posed.jitters:
