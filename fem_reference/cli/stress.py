@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
-    many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps: same end, or a status"
+    many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps: one end"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on N randomly perturbed meshes of each case as well"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
