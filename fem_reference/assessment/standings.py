@@ -58,6 +58,10 @@ class Standing(Record):
         """True where it was measured by this protocol, on runs of these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
+    def kept(self, missing: bool) -> "Standing":
+        """The row where its case was not made anew; ``missing``: because that could not be."""
+        return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
+
     def asked(self, only: Collection[str]) -> bool:
         """True where it is to be made anew: ``only`` some states, or all where that is empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
@@ -85,9 +89,10 @@ class Standings(Record):
         )
 
     def overall(self) -> list["OverCases"]:
-        """Every solver over its cases, by group and share of cases that it solved, then by error."""
-        solvers = dict.fromkeys((row.group, row.name) for row in self.rows)
-        found = [OverCases.of([row for row in self.rows if (row.group, row.name) == one]) for one in solvers]
+        """Every solver over its cases, without stale rows, by group and share of cases that it solved, then by error."""
+        rows = [row for row in self.rows if not row.stale]
+        solvers = dict.fromkeys((row.group, row.name) for row in rows)
+        found = [OverCases.of([row for row in rows if (row.group, row.name) == one]) for one in solvers]
         groups = list(dict.fromkeys(one.group for one in found))
         return sorted(found, key=lambda one: (groups.index(one.group), len(one.lost) / one.count, one.share))
 

@@ -89,7 +89,7 @@ def stand(
         except InputError as error:
             missing[scene.name] = str(error)
     done = {row.case for row in rows}
-    rows += [row for row in before if row.case not in done]
+    rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
 
 
@@ -101,6 +101,9 @@ def _on(
     missing: dict[str, str],
 ) -> Iterator[Standing]:
     case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
+    if reference.outcome.status != "converged":
+        got = f"a reference that {reference.outcome.status}: {reference.outcome.message}"
+        raise InputError(case.place, got, "one that reaches all frames")
     measured = _Measured(bench, reference, context_of(bench.setup(), reference), missing)
     truth = Candidate(name="reference", **case.reference.model_dump())
     ours = [Entrant(one, kind) for kind, one, _ in table_5_1.chosen(case, solver_kinds())]

@@ -146,6 +146,20 @@ def test_a_program_states_its_group_and_law() -> None:
 
 
 @pytest.mark.usefixtures("place")
+def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> None:
+    stand("--program", "still")
+
+    def stop(problem, _, sink) -> Outcome:
+        sink(Frame(0, problem.surface.points, problem.fibres.points))
+        return Outcome("diverged", "at frame 5")
+
+    stand_ins.solve_by(monkeypatch, fenicsx, stop)
+    found = stand("--program", "still", "--set", "reference.newton_iterations=7")
+    assert "a reference that diverged: at frame 5" in found["missing"]["bar"]
+    assert [row["stale"] for row in found["rows"]] == [True, True]
+
+
+@pytest.mark.usefixtures("place")
 def test_bad_states_are_named(capsys) -> None:
     assert cli.main(["standings", "./bar", "--only", "old"]) == cli.BAD_INPUT
     assert '--only: got "old", want some of failed,stale' in capsys.readouterr().err
