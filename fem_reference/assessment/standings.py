@@ -12,7 +12,7 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 
 # Of what is measured and how: rows of another number are stale.
-PROTOCOL = 1
+PROTOCOL = 2
 STATES = ("failed", "stale")
 # What rows are compared by, [mm]; its value in other units; and where it is matched: an error [mm], the time of a frame number [s].
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
@@ -23,8 +23,8 @@ _COST = "seconds_per_frame"
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
     empty for the reference, which has ``bars``. ``unsound``: why its frames are no answer. ``split``: by part the root mean square
-    [mm] of its error. ``least_error`` [mm] of its settings within the matched time, ``least_time`` [s] within the error. ``truth``
-    and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``: True where
+    [mm] of its error. ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
+    ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``: True where
     case, reference, solver or protocol changed since.
     """
 
