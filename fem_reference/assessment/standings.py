@@ -24,8 +24,8 @@ class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
     empty for the reference, which has ``bars``. ``unsound``: why its frames are no answer. ``split``: by part the root mean square
     [mm] of its error. ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
-    ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``: True
-    where case, reference, solver or protocol changed since.
+    ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
+    True where case, reference, solver or protocol changed since.
     """
 
     case: str
