@@ -23,6 +23,8 @@ def unsound(run: Run, reference: Run) -> str:
     """
     if run.positions.shape != reference.positions.shape:
         return ""  # lines, or another surface
+    if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
+        return "unknown: no frame is of numbers alone"
     both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
     for i in np.flatnonzero(both):
         if why := _of_frame(run, run.positions[i], reference.positions[i]):

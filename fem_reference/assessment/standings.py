@@ -12,7 +12,7 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 
 # Of what is measured and how: rows of another number are stale.
-PROTOCOL = 1
+PROTOCOL = 2
 STATES = ("failed", "stale")
 # What rows are compared by, [mm]; its value in other units; and where it is matched: an error [mm], the time of a frame number [s].
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
@@ -23,9 +23,9 @@ _COST = "seconds_per_frame"
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
     empty for the reference, which has ``bars``. ``unsound``: why its frames are no answer. ``split``: by part the root mean square
-    [mm] of its error. ``least_error`` [mm] of its settings within the matched time, ``least_time`` [s] within the error. ``truth``
-    and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``: True where
-    case, reference, solver or protocol changed since.
+    [mm] of its error. ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
+    ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
+    True where case, reference, solver or protocol changed since.
     """
 
     case: str
@@ -58,6 +58,10 @@ class Standing(Record):
         """True where it was measured by this protocol, on runs of these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
+    def kept(self, missing: bool) -> "Standing":
+        """The row where its case was not made anew; ``missing``: because that could not be."""
+        return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
+
     def asked(self, only: Collection[str]) -> bool:
         """True where it is to be made anew: ``only`` some states, or all where that is empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
@@ -85,9 +89,10 @@ class Standings(Record):
         )
 
     def overall(self) -> list["OverCases"]:
-        """Every solver over its cases, by group and share of cases that it solved, then by error."""
-        solvers = dict.fromkeys((row.group, row.name) for row in self.rows)
-        found = [OverCases.of([row for row in self.rows if (row.group, row.name) == one]) for one in solvers]
+        """Every solver over its cases, without stale rows, by group and share of cases that it solved, then by error."""
+        rows = [row for row in self.rows if not row.stale]
+        solvers = dict.fromkeys((row.group, row.name) for row in rows)
+        found = [OverCases.of([row for row in rows if (row.group, row.name) == one]) for one in solvers]
         groups = list(dict.fromkeys(one.group for one in found))
         return sorted(found, key=lambda one: (groups.index(one.group), len(one.lost) / one.count, one.share))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fem_reference.assessment.standings import STATES, load
 from fem_reference.cli import DONE, SOLVER_FAILED, out
-from fem_reference.cli._cases import check_names, muscle_case, publish
+from fem_reference.cli._cases import muscle_case, publish
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import standings_page
@@ -37,10 +37,11 @@ def run(options: argparse.Namespace) -> int:
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:
         raise InputError("--only", f'"{options.only}"', f"some of {','.join(STATES)}")
+    if options.submission and (options.quick or options.set):
+        raise InputError("--submission", "--quick or --set beside it", "the cases as they are published")
     cases = [muscle_case(case, options, quick=options.quick) for case in options.cases or standings.CASES]
     entrants = [standings.program(folder) for folder in options.program]
     entrants += [standings.submission(folder) for folder in options.submission]
-    check_names([f"{one.candidate.name} {one.case}" for one in entrants])
     before = load(out(options) / f"{options.page_name or PAGE}.json")
     with fenicsx.shared():
         found = standings.stand(cases, out(options) / "runs", entrants, before, only)

@@ -34,7 +34,9 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
     """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``; InputError
     where it has no such law, or laws of regions.
     """
-    found = moduli(case.effects)
+    found = moduli([one for one in case.effects if name_of(one) in _LAW])
+    if (found.shear, found.bulk) != (moduli(case.effects).shear, moduli(case.effects).bulk):
+        raise InputError(case.place, "shear or bulk modulus of another effect", f"those of {', '.join(_LAW)} alone")
     if regions_named(case.effects) or not min(found.shear, found.bulk) > 0:
         raise InputError(case.place, "laws of regions, or no shear or bulk modulus", "one law of the whole muscle")
     mu, bulk = found.shear, found.bulk

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment import standings
-from fem_reference.assessment.cost_study import load
 from fem_reference.assessment.fronts import Point
 from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.assessment.soundness import unsound
@@ -32,6 +31,8 @@ log = logging.getLogger(__name__)
 
 # The cases of our own geometry.
 CASES = ("hip_flexion", "box_squeeze", "box_squeeze_report")
+# The machine of frames that were submitted with their time.
+THEIRS = "as stated by its authors"
 
 
 @dataclass(frozen=True)
@@ -81,16 +82,31 @@ def stand(
     """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``. Of the rows ``before``, those of
     other cases are kept, and with ``only`` some states (``STATES``) those in no such state.
     """
-    rows, missing = list[Standing](), dict[str, str]()
+    _check_names(entrants)
+    rows, missing, asked = list[Standing](), dict[str, str](), list[str]()
     for scene in scenes:
+        asked.append(scene.name)
         known = {row.name: row for row in before if row.case == scene.name}
         try:
             rows += _on(Bench(scene, store), entrants, known, only, missing)
         except InputError as error:
             missing[scene.name] = str(error)
+    for one in entrants:
+        if one.case not in ("", *asked):
+            missing[f"{one.case}, {one.candidate.name}"] = f"this case is not asked, only {', '.join(asked)}"
     done = {row.case for row in rows}
-    rows += [row for row in before if row.case not in done]
+    rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
+
+
+def _check_names(entrants: Sequence[Entrant]) -> None:
+    """InputError where two entrants of one name have a case in common."""
+    cases = dict[str, list[str]]()
+    for one in entrants:
+        others = cases.setdefault(one.candidate.name, [])
+        if others and (one.case in ("", *others) or "" in others):
+            raise InputError(one.candidate.name, "two solvers of this name on a case", "names that differ")
+        others.append(one.case)
 
 
 def _on(
@@ -101,6 +117,9 @@ def _on(
     missing: dict[str, str],
 ) -> Iterator[Standing]:
     case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
+    if reference.outcome.status != "converged":
+        got = f"a reference that {reference.outcome.status}: {reference.outcome.message}"
+        raise InputError(case.place, got, "one that reaches all frames")
     measured = _Measured(bench, reference, context_of(bench.setup(), reference), missing)
     truth = Candidate(name="reference", **case.reference.model_dump())
     ours = [Entrant(one, kind) for kind, one, _ in table_5_1.chosen(case, solver_kinds())]
@@ -140,7 +159,7 @@ class _Measured:
     def key(self, one: Entrant) -> str:
         """The key of the run of an entrant; for submitted frames a hash of what is submitted."""
         if one.candidate.solver == "recorded":
-            said = recorded.about(Path(one.candidate.settings["folder"]))
+            said = recorded.checked_about(Path(one.candidate.settings["folder"]), None)
             return hashlib.sha256(said.model_dump_json().encode()).hexdigest()[:16]
         return self.bench.folder(one.candidate, one.candidate.name).name
 
@@ -152,7 +171,8 @@ class _Measured:
         own = run is self.reference
         worst = {} if own else cost.greatest(run, self.reference, self.context, in_tables())
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
-        least = standings.matched([*self._studied(one), _point(run, one, worst, seconds)])
+        submitted = one.candidate.solver == "recorded"  # its time is of another machine
+        least = standings.matched([] if submitted else [_point(run, one, worst, seconds)])
         return Standing(
             case=self.bench.scene.name,
             group=one.group,
@@ -171,7 +191,7 @@ class _Measured:
             run=self.truth if own else self.key(one),
             frames=hashlib.sha256(np.ascontiguousarray(run.positions).tobytes()).hexdigest(),
             date=datetime.now(UTC).strftime("%Y-%m-%d"),
-            machine=str(run.origin.get("machine", machine())),
+            machine=THEIRS if submitted else str(run.origin.get("machine", machine())),
             protocol=PROTOCOL,
         )
 
@@ -185,12 +205,6 @@ class _Measured:
         except InputError as error:
             self.missing[f"{self.bench.scene.name}, parts of the error of {run.name}"] = str(error)
             return {}
-
-    def _studied(self, one: Entrant) -> list[Point]:
-        """The points of stored studies of an entrant on this case, against this truth."""
-        found = [study for path in self.bench.store.parent.glob(f"*/{cost.FILE}") for study in load(path)]
-        points = [point for study in found if study.truth_key == self.truth for point in study.points]
-        return [point for point in points if point.name == one.candidate.name]
 
 
 def _point(run: Run, one: Entrant, worst: dict[str, float], seconds: float | None) -> Point:

@@ -64,6 +64,12 @@ def test_what_is_only_wrong_is_sound() -> None:
     assert unsound(lost, TRUTH) == unsound(run(MOVED[1] * 1e6), lost) == ""  # statuses and statistics say so
 
 
+def test_a_run_that_says_it_converged_without_a_frame_is_no_answer() -> None:
+    nothing = replace(TRUTH, positions=TRUTH.positions * NAN)
+    assert unsound(nothing, TRUTH).startswith("unknown: ")
+    assert unsound(replace(nothing, outcome=Outcome("crashed", "at once")), TRUTH) == ""
+
+
 def test_it_is_not_ranked_and_named_on_the_page(tmp_path, monkeypatch) -> None:
     found = with_bars(small_comparison(tmp_path, monkeypatch))
     assert "quick" in {place.deviation.name for one in found.rankings for place in one.places}

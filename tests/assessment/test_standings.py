@@ -50,6 +50,17 @@ def test_over_cases_medians_of_what_is_sound_count() -> None:
     assert [one.name for one in Standings(rows=tuple(rows), missing={}).overall()][:2] == ["a", "b"]
 
 
+def test_kept_rows_are_stale_by_protocol_or_a_missing_case_and_count_nowhere() -> None:
+    assert [row("a", protocol=p).kept(gone).stale for p, gone in ((PROTOCOL, False), (0, False), (PROTOCOL, True))] == [
+        False,
+        True,
+        True,
+    ]
+    assert row("a", stale=True).kept(missing=False).stale
+    rows = (row("a", 1.0, "x"), row("a", 9.0, "y", stale=True), row("b", stale=True))
+    assert [(one.name, one.count, one.share) for one in Standings(rows=rows, missing={}).overall()] == [("a", 1, 10.0)]
+
+
 def test_matched_are_the_least_error_in_time_and_the_least_time_within_error() -> None:
     pairs = ((9.0, 0.001), (1.5, 0.05), (1.0, 0.5), (0.2, 3.0))
     points = [Point("c", "s", "s", "", "", {}, "converged", "", {ERROR: e}, {"seconds_per_frame": t}) for e, t in pairs]

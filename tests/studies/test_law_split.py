@@ -34,6 +34,13 @@ def test_lames_parameters_are_those_of_the_matrix(bench) -> None:
             law_split.lame(bench.scene.model_copy(update={"effect": effects}), 0.45)
 
 
+def test_stiffness_of_another_effect_is_refused(bench) -> None:
+    # Collagen across the fibre adds shear that no solver of the matrix alone takes; fibres add none.
+    across = fr.make_effect("collagen_across", k1="4 kPa", k2=1.0)
+    with pytest.raises(InputError, match="modulus of another effect"):
+        law_split.lame(bench.scene.model_copy(update={"effect": (*bench.scene.effect, across)}), 0.45)
+
+
 def test_each_part_is_found_where_it_was_put(bench) -> None:
     law = law_split.law_of("st_venant_kirchhoff", bench.scene, 0.45)
     own = bench.scene.model_copy(

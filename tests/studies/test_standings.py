@@ -81,6 +81,8 @@ def test_everybody_stands_with_provenance_and_what_holds_is_kept(monkeypatch) ->
     assert rows["mine"]["worst"][ERROR] == pytest.approx(1, abs=1e-6)
     assert rows["mine"]["status"] == "converged"
     assert rows["mine"]["unsound"] == ""
+    assert rows["mine"]["machine"] == "as stated by its authors" != rows["still"]["machine"]
+    assert rows["still"]["least_time"] == rows["still"]["seconds_per_frame"] > 0
     assert rows["still"]["unsound"].startswith("stuck: ") is False  # the reference moves by 0.2 mm alone
     assert all(row["date"] and row["machine"] and len(row["frames"]) == 64 for row in first["rows"])
     assert first["missing"] == {}
@@ -131,9 +133,30 @@ def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) 
     (place / "mine" / "more.ply").unlink()
     body = small.body()
     files.write_surface(place / "mine" / "frame_0020.ply", body, body.points)
+    for only in ((), ("--only", "failed")):
+        found = stand("--submission", "mine", *only)
+        assert [row["name"] for row in found["rows"]] == ["reference"]
+        assert "sha256.frame_0020.ply" in found["missing"]["bar, mine"]
+
+
+def test_a_submission_is_of_one_case_as_it_was_published(place, capsys) -> None:
+    for words in (("--quick",), ("--set", "reference.newton_iterations=7")):
+        assert cli.main(["standings", "./bar", "--submission", "mine", *words]) == cli.BAD_INPUT
+        assert "--submission: got --quick or --set" in capsys.readouterr().err
+    submit(place / "mine", case="baar", seconds_per_frame="")
     found = stand("--submission", "mine")
-    assert [row["name"] for row in found["rows"]] == ["reference"]
-    assert "sha256.frame_0020.ply" in found["missing"]["bar, mine"]
+    assert found["missing"] == {"baar, mine": "this case is not asked, only bar"}
+    submit(place / "mine", name="still")
+    assert cli.main(["standings", "./bar", "--program", "still", "--submission", "mine"]) == cli.BAD_INPUT
+    assert "still: got two solvers of this name on a case" in capsys.readouterr().err
+
+
+def test_the_time_of_a_submission_is_not_ranked(place) -> None:
+    submit(place / "mine")
+    about = place / "mine" / "candidate.toml"
+    about.write_text("seconds_per_frame = 0.001\n" + about.read_text())
+    mine = stand("--submission", "mine")["rows"][-1]
+    assert (mine["seconds_per_frame"], mine["least_error"], mine["least_time"]) == (0.001, None, None)
 
 
 @pytest.mark.usefixtures("place")
@@ -143,6 +166,20 @@ def test_a_program_states_its_group_and_law() -> None:
     law = standings.program(Path(__file__).parents[2] / "candidates" / "mujoco_flex")
     assert (law.group, law.law, law.takes) == ("Implicit FEM", "st_venant_kirchhoff", ())
     assert casefile.read("hip_flexion").name in standings.CASES
+
+
+@pytest.mark.usefixtures("place")
+def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> None:
+    stand("--program", "still")
+
+    def stop(problem, _, sink) -> Outcome:
+        sink(Frame(0, problem.surface.points, problem.fibres.points))
+        return Outcome("diverged", "at frame 5")
+
+    stand_ins.solve_by(monkeypatch, fenicsx, stop)
+    found = stand("--program", "still", "--set", "reference.newton_iterations=7")
+    assert "a reference that diverged: at frame 5" in found["missing"]["bar"]
+    assert [row["stale"] for row in found["rows"]] == [True, True]
 
 
 @pytest.mark.usefixtures("place")
