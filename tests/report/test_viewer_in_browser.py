@@ -7,8 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapes
 from browser import PROGRAM, Browser
 
+from fem_reference.foundations.mesh import Surface, boundary
+from fem_reference.geometry.skins import quartered
 from fem_reference.report import comparison_page, viewer, viewer_fields
 from tests.report.comparisons import NUMBERS, alone, html
 from tests.report.packed import acted_on, with_bars
@@ -202,6 +205,23 @@ def test_attached_and_touched_vertices_are_seen_until_they_are_hidden(browser, c
     assert (np.abs(seen - without).max(axis=2) > 60).sum() > 20
     click(browser, "attached")
     assert pink(browser.picture("#viewer-stage")) == 0
+    assert browser.complaints() == []
+
+
+@pytest.mark.parametrize(("times", "seen"), [(1, True), (4, False)])
+def test_a_muscle_is_seen_through_a_plate_and_not_through_a_bone(browser, comparison, tmp_path, times, seen):
+    """A box of twelve triangles around the muscle is a plate; the same box in more triangles is a bone."""
+    sides = shapes.box((1, 1, 1), (100.0, 100.0, 100.0))
+    corners = sides.points[boundary(sides.tets)[0]] - 50.0
+    corners = corners if times == 1 else quartered(corners)
+    box = Surface(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    assert len(corners) == 12 * times
+    (bone,) = comparison.setup.bones
+    around = replace(comparison.setup, bones=(replace(bone, surface=box),))
+    show(browser, replace(alone(comparison), setup=around), tmp_path)
+    picture = browser.picture("#viewer-stage").astype(int)
+    red = (picture[:, :, 0] > picture[:, :, 1] + 15).sum()  # as the muscle is, and no bone
+    assert (red > 1000) == seen
     assert browser.complaints() == []
 
 
