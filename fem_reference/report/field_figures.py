@@ -13,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
 
 from fem_reference.assessment.comparison import Comparison
@@ -52,6 +52,9 @@ def convergence(example: Comparison) -> Drawing:
     def draw(axes: Axes) -> None:
         for i, (element, cells, errors) in enumerate(lines):
             axes.loglog(cells, errors, "o-", color=colour_of(i + 1), label=element)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_minor_formatter(NullFormatter())
         axes.set(xlabel="cells", ylabel="error")
 
     return _svg(f"{example.scene.name}-convergence", title, draw)

@@ -168,14 +168,16 @@ def front(case: CaseStudy, error: str) -> Drawing:
 
 def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
     """The limits of requests as lines, and the best setting of each as a numbered diamond."""
+    numbers = dict[tuple[float, float], list[str]]()
     for i, one in enumerate(found):
         for limit, line in ((one.limits.get("error"), axes.axhline), (one.limits.get("time"), axes.axvline)):
             if limit is not None:
                 line(limit, color="#888888", linestyle=":", linewidth=1)
         if one.best is not None:
-            place = one.best.time, one.best.counted
-            axes.plot(*place, "D", color="#1d1d1f", markersize=7, fillstyle="none")
-            axes.annotate(str(i + 1), place, (5, 5 - 9 * (i % 2)), textcoords="offset points", color="#1d1d1f")
+            numbers.setdefault((one.best.time, one.best.counted), []).append(str(i + 1))
+    for i, (place, these) in enumerate(numbers.items()):
+        axes.plot(*place, "D", color="#1d1d1f", markersize=7, fillstyle="none")
+        axes.annotate(", ".join(these), place, (5, 5 - 9 * (i % 2)), textcoords="offset points", color="#1d1d1f")
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:

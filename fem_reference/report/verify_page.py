@@ -157,7 +157,9 @@ def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> 
         Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=inner, label=label, markersize=5.5)
         for label, (mark, colour, inner) in marks.items()
     ]
-    figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=1, columnspacing=1.4)
+    figure.legend(
+        handles=handles, loc="outside upper left", ncols=6, handlelength=1, columnspacing=1.4, borderaxespad=0
+    )
 
 
 def drawable(one: Result) -> bool:

@@ -111,6 +111,22 @@ def test_a_table_that_is_cut_shows_it(browser, written, kind, scheme) -> None:
     assert not browser.ask("document.querySelector('.wide[tabindex]')")
 
 
+# Pairs of words of one drawing whose boxes share more than 2 pixels in both directions.
+OVERPRINTED = """[...document.querySelectorAll('svg')].flatMap(svg => {
+  const words = [...svg.querySelectorAll('text')].filter(it => it.textContent.trim());
+  const boxes = words.map(it => it.getBoundingClientRect());
+  return boxes.flatMap((a, i) => boxes.slice(i + 1).flatMap((b, j) =>
+    Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2
+      ? [words[i].textContent + ' | ' + words[i + 1 + j].textContent] : []));
+})"""
+
+
+@pytest.mark.parametrize("kind", every_page.KINDS)
+def test_words_of_a_drawing_do_not_lie_on_each_other(browser, written, kind) -> None:
+    show(browser, written[kind], DESK, scheme="light")
+    assert browser.ask(OVERPRINTED) == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_names_in_three_dimensions_are_seen(browser, written, scheme) -> None:
     show(browser, written["comparison"], DESK, scheme=scheme)
