@@ -124,7 +124,7 @@ def _on(
     truth = Candidate(name="reference", **case.reference.model_dump())
     ours = [Entrant(one, kind) for kind, one, _ in table_5_1.chosen(case, solver_kinds())]
     taken = {truth.name, *(one.candidate.name for one in ours)}
-    yield measured.row(Entrant(truth, table_5_1.REFERENCE), reference)
+    yield measured.row(Entrant(truth, table_5_1.REFERENCE), reference, measured.truth)
     for one in (*ours, *(one for one in entrants if one.case in ("", case.name))):
         name = one.candidate.name
         try:
@@ -138,7 +138,7 @@ def _on(
                 yield old
                 continue
             log.info("%s: %s", case.name, name)
-            yield measured.row(one, complete(measured.run(one), case.numbers))
+            yield measured.row(one, complete(measured.run(one), case.numbers), key)
         except InputError as error:
             missing[f"{case.name}, {name}"] = str(error)
 
@@ -167,7 +167,8 @@ class _Measured:
         made = self.bench.read if one.candidate.solver == "recorded" else self.bench.obtain
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
-    def row(self, one: Entrant, run: Run) -> Standing:
+    def row(self, one: Entrant, run: Run, key: str) -> Standing:
+        """The row of a run of this ``key``."""
         own = run is self.reference
         worst = {} if own else cost.greatest(run, self.reference, self.context, in_tables())
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
@@ -188,7 +189,7 @@ class _Measured:
             least_error=None if why or own else least[0],
             least_time=None if why or own else least[1],
             truth=self.truth,
-            run=self.truth if own else self.key(one),
+            run=key,
             frames=hashlib.sha256(np.ascontiguousarray(run.positions).tobytes()).hexdigest(),
             date=datetime.now(UTC).strftime("%Y-%m-%d"),
             machine=THEIRS if submitted else str(run.origin.get("machine", machine())),
