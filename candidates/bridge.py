@@ -177,7 +177,7 @@ def drive(solver: Solver, scene: Scene, steps: int, keep: Any) -> float:
 
 
 def main(make: Any, package: str, **kinds: type) -> None:
-    """Run a candidate of a ``package`` on the scene and write frames; ``kinds``: settings beside ``steps`` from a frame to the next."""
+    """Run a candidate of a ``package`` on the scene and write frames; ``kinds``: its settings beside ``steps``."""
     if hasattr(os, "sched_setaffinity"):  # one thread, whatever its library starts
         mine = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {mine[os.getpid() % len(mine)]})
