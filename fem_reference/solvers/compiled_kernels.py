@@ -62,7 +62,7 @@ def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
     A compiled function contains those that it calls. numba checks only a function's own file for changes,
-    hence one folder for each version of all loops together.
+    so each version of all loops together has a folder.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):
