@@ -204,6 +204,7 @@ ADDED = {
     "contact of a part with itself": 220,
     "own solvers as commands, load of the machine, answers first": 880,
     "laws of other people's solvers, split errors, standings": 700,
+    "a data set to learn from": 460,
 }
 
 
