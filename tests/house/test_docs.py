@@ -65,12 +65,13 @@ def test_what_febio_has_of_each_effect_is_what_is_exported() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
-def test_the_recipe_of_an_ordinary_muscle_can_be_solved() -> None:
-    """Every frame on unrefined tetrahedra, with its volume kept, and active fibres that pull harder than passive ones."""
+def test_the_recipe_of_an_ordinary_muscle_can_be_solved(tmp_path: Path) -> None:
+    """Its last frames on unrefined tetrahedra, with its volume kept."""
     (text,) = (text for name, text in pages.snippets("toml") if name == "docs/ordinary_muscle.md")
-    changes = {"muscle.refinements": 0, "frames.every": 50}
-    case = fr.make_case(tomllib.loads(text), name="ordinary_muscle", changes=changes)
-    run = fr.solve(case)
+    table = tomllib.loads(text)
+    table["muscle"]["refinements"], table["frames"]["every"] = 0, 50
+    case = fr.make_case(table, name="ordinary_muscle")
+    run = fr.solve(case, store=tmp_path)
     assert run.outcome.status == "converged"
     assert fr.compare(case, run, []).word in ("pass", "doubtful pass")
 
