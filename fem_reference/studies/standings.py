@@ -218,6 +218,6 @@ class _Measured:
 
 
 def _from_rest(run: Run, reference: Run) -> float | None:
-    """How far [mm] (rms) a ``run`` ends from its first frame; None where the reference does not come back, or it has no end."""
+    """Return the distance [mm] (rms) from the first to the last frame; None where the reference does not come back."""
     away = [np.sqrt(np.mean(np.sum((one.positions[-1] - one.positions[0]) ** 2, axis=1))) for one in (run, reference)]
     return float(away[0]) if away[1] <= _BACK and np.isfinite(away[0]) else None
