@@ -93,6 +93,14 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
     return tuple(made)
 
 
+def spread[S, T](of: Callable[[S], T], items: Sequence[S], workers: Workers) -> list[T]:
+    """The results ``of`` items in their order, by ``workers``."""
+    if workers == Workers():
+        return [of(item) for item in items]
+    with _executor(workers) as executor:
+        return list(executor.map(of, items))
+
+
 def solve(trial: Trial, store: Path) -> Run:
     """The run of a trial, in this process; one that failed before, and would fail again, is not repeated."""
     bench = shared_bench(trial.scene, store)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fem_reference.foundations.subprocesses import environment
@@ -101,3 +102,18 @@ def test_the_regression_check_passes_in_pytest(folder: Path) -> None:
     for name in ("own_scene.py", "own_solver.py", "test_my_solver.py"):
         shutil.copy(EXAMPLES / name, folder)
     assert "2 passed" in output(folder, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_my_solver.py")
+
+
+def test_learned_baselines_find_what_they_can_represent(monkeypatch) -> None:
+    """The kernel spans all polynomials of degree 2, so one is found but for its least ridge; the network explains most of it."""
+    monkeypatch.syspath_prepend(EXAMPLES / "data_set")
+    found = runpy.run_path(str(EXAMPLES / "data_set" / "learn.py"))
+    rng = np.random.default_rng(1)
+    x, at = rng.normal(size=(60, 3)) / 2, rng.normal(size=(20, 3)) / 2
+
+    def truth(x: np.ndarray) -> np.ndarray:
+        return np.stack([x[:, 0] - 2 * x[:, 1], x[:, 0] * x[:, 2] + 1], axis=1)
+
+    for name, within in (("kernel", 1e-4), ("network", 0.2)):
+        away = found[name](x, truth(x), at) - truth(at)
+        assert np.sqrt((away**2).mean()) < within * truth(at).std(), name

@@ -1,0 +1,60 @@
+"""Learned baselines on poses and shapes not seen: ``python learn.py FOLDER`` prints mean distances of vertices from the truth."""
+
+import sys
+import time
+
+import numpy as np
+from load import load
+from network import network
+
+
+def blended(one: dict) -> np.ndarray:
+    """Each vertex goes with both bones, by its height: what is learned is the rest."""
+    at = np.c_[one["points"], np.ones(len(one["points"]))]
+    upper, lower = (at @ one["poses"][:, i, :3].transpose(0, 2, 1) for i in (0, 1))
+    return lower + at[:, 2:3] / at[:, 2].max() * (upper - lower)
+
+
+def features(one: dict) -> np.ndarray:
+    """Poses of up to three bones and activation by frame; the sizes of the shape at seven heights, its length and bow."""
+    poses = np.zeros((len(one["frames"]), 3, 3, 4))
+    poses[:, : one["poses"].shape[1]] = one["poses"][:, :, :3] - np.eye(4)[:3]
+    fixed = [*np.ptp(one["points"][:420].reshape(21, 20, 3)[::3], axis=1)[:, :2].ravel()]
+    fixed += [one["points"][:, 2].max(), one["points"][200:220, 0].mean()]
+    return np.c_[poses.reshape(len(poses), -1), one["activation"], np.tile(fixed, (len(poses), 1))]
+
+
+def kernel(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Ridge regression by ``(1 + x.x')^2``, its weight by leaving one out."""
+    own, tried = (1 + x @ x.T) ** 2, {}
+    for weight in 10.0 ** np.arange(-6, 3):
+        inverse = np.linalg.inv(own + weight * np.eye(len(x)))
+        tried[np.linalg.norm(inverse @ y / np.diag(inverse)[:, None])] = inverse
+    return (1 + at @ x.T) ** 2 @ tried[min(tried)] @ y
+
+
+def learned(fit, seen: list, one: dict, rows: list) -> np.ndarray:
+    """Positions in ``rows`` of a scene, by a ``fit`` of coefficients of the modes of what was seen."""
+    x = np.concatenate([features(other)[r] for other, r in seen])
+    y = np.concatenate([(other["positions"] - blended(other))[r].reshape(len(r), -1) for other, r in seen])
+    modes = np.linalg.svd(y, full_matrices=False)[2][:20]
+    scale = np.where((spread := x.std(axis=0)) > 1e-9, spread * (spread > 1e-9).sum() ** 0.5, np.inf)
+    x, at = (x - x.mean(axis=0)) / scale, (features(one)[rows] - x.mean(axis=0)) / scale
+    return blended(one)[rows] + (fit(x, y @ modes.T, at) @ modes).reshape(len(rows), -1, 3)
+
+
+def of(folder: str, split: str, part: str) -> list:
+    """The muscles drawn at random."""
+    return [pair for pair in load(folder, split, part) if len(pair[0]["points"]) == 422]
+
+
+if __name__ == "__main__":
+    for split in ("pose", "shape"):
+        train, test = of(sys.argv[1], split, "train"), of(sys.argv[1], split, "test")
+        for fit in (kernel, network, None):
+            away, begin = [], time.process_time()
+            for i, (one, rows) in enumerate(test):
+                found = learned(fit, [train[i]] if split == "pose" else train, one, rows) if fit else blended(one)[rows]
+                away.append(np.linalg.norm(found - one["positions"][rows], axis=2).mean())
+            name = fit.__name__ if fit else "bones blended"
+            print(f"{split}, {name}: {np.mean(away):.3f} mm, {len(test)} muscles, {time.process_time() - begin:.2f} s")
