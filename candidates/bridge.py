@@ -13,6 +13,7 @@ import sys
 import time
 import tomllib
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -87,7 +88,7 @@ class Scene:
 
     def attached(self, poses: dict[str, np.ndarray]) -> np.ndarray:
         """Places (h, 3) [m] of the held vertices, each with its bone."""
-        at = np.stack([poses[bone] for bone in self.holders])
+        at = np.array([poses[bone] for bone in self.holders]).reshape(-1, 4, 4)
         return np.einsum("hij,hj->hi", at[:, :3, :3], self.points[self.held]) + at[:, :3, 3]
 
 
@@ -106,28 +107,34 @@ class Solver(Protocol):
 def read(folder: Path) -> Scene:
     """The scene that ``export`` wrote into a ``folder``; ends with a sentence where it has no law that a candidate stands for."""
     said, mesh = json.loads((folder / "scene.json").read_text()), meshio.read(folder / "tets.vtu")
-    laws = {effect["name"]: effect["parameters"] for effect in said["effects"] if "in" not in effect}
+    laws = dict[str, Any]()  # of the first region, where there are several
+    for effect in said["effects"]:
+        laws.setdefault(effect["name"], effect["parameters"])
     if not set(LAW) <= set(laws):
         sys.exit(f"the scene has {', '.join(laws)}; wanted {' and '.join(LAW)}, which the solver's own law stands for")
     tets = mesh.cells_dict["tetra"]
     corners = mesh.points[tets]
     turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
     tets[turned] = tets[turned][:, [0, 2, 1, 3]]
-    holders = {int(point): bone for _, bone, *facet in _rows(folder / "attachment_facets.csv") for point in facet}
+    mu, size = laws["neo_hooke"]["mu"]["value"], np.linalg.norm(np.ptp(mesh.points, axis=0))
+    springs = {one["name"]: one["stiffness"] for one in said["attachments"] if one["stiffness"] is not None}
+    free = {name for name, stiffness in springs.items() if stiffness * size < mu}  # softer than the muscle
+    facets = [row for row in _rows(folder / "attachment_facets.csv") if row[0] not in free]
+    holders = {int(point): bone for _, bone, *facet in facets for point in facet}
     poses: dict[str, dict[int, np.ndarray]] = {}
     for bone, frame, *numbers in _rows(folder / "poses.csv"):
         matrix = np.array(numbers, float).reshape(4, 4)
         matrix[:3, 3] *= METRE
         poses.setdefault(bone, {})[int(frame)] = matrix
     bones = [(bone["name"], meshio.read(folder / bone["file"])) for bone in said["bones"] if bone.get("obstacle")]
-    softer = [f"springs of {one['name']} (held exactly)" for one in said["attachments"] if one["stiffness"] is not None]
-    inner = [f"{effect['name']} in {effect['in']}" for effect in said["effects"] if "in" in effect]
+    softer = [f"springs of {name} ({'left free' if name in free else 'held exactly'})" for name in springs]
+    inner = [f"{one['name']} in {one['in']}" for one in said["effects"] if laws[one["name"]] is not one["parameters"]]
     return Scene(
         points=mesh.points * METRE,
         tets=tets,
         held=np.array(sorted(holders), int),
         holders=np.array([holders[point] for point in sorted(holders)]),
-        mu=laws["neo_hooke"]["mu"]["value"] * 1e6,
+        mu=mu * 1e6,
         bulk=laws["incompressible"]["bulk"]["value"] * 1e6,
         bones=tuple(Bone(name, bone.points * METRE, bone.cells_dict["triangle"]) for name, bone in bones),
         poses=poses,
@@ -169,8 +176,8 @@ def drive(solver: Solver, scene: Scene, steps: int, keep: Any) -> float:
     return spent
 
 
-def main(make: Any, version: str, **kinds: type) -> None:
-    """Run a candidate on the scene and write frames; ``kinds``: its settings beside the ``steps`` from a frame to the next."""
+def main(make: Any, package: str, **kinds: type) -> None:
+    """Run a candidate of a ``package`` on the scene and write frames; ``kinds``: its settings beside ``steps``."""
     if hasattr(os, "sched_setaffinity"):  # one thread, whatever its library starts
         mine = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {mine[os.getpid() % len(mine)]})
@@ -187,6 +194,6 @@ def main(make: Any, version: str, **kinds: type) -> None:
     left_out = [effect for effect in scene.effects if effect not in (*LAW, *takes)] + list(solver.lost)
     spent = drive(solver, scene, steps, lambda frame, points: skin.write(out / f"frame_{frame:04d}.ply", points))
     numbers = scene.frames[-1] - scene.frames[0]
-    about = f'version = "{version}"\nunit = "mm"\nseconds_per_frame = {spent / numbers:.6g}\nthreads = 1\n'
+    about = f'version = "{package}-{version(package)}"\nunit = "mm"\nseconds_per_frame = {spent / numbers:.6g}\nthreads = 1\n'
     (out / "candidate.toml").write_text(f"{about}left_out = {json.dumps(left_out)}\n")
     print("left out:", ", ".join(left_out) or "nothing")

@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
+from statistics import mean, pstdev
 from typing import Any, NamedTuple
 
-from fem_reference.assessment import cost_study, fronts
+from fem_reference.assessment import cost_study, credibility, fronts
+from fem_reference.assessment.catalogue import Entry
 from fem_reference.assessment.recommendation import TIME
 from fem_reference.assessment.stress import VERDICTS
 from fem_reference.foundations.records import parse
+from fem_reference.verification import runner
 
 KEPT = Path(__file__).parent / "measured"
 _SURFACE, _TIME = "surface_deviation.rms", "seconds_processor"
@@ -123,16 +126,57 @@ def _credibility(found: dict[str, Any]) -> Any:
 
 
 def _credibility_grades() -> str:
+    """By quantity all evidence: what verifies it by the catalogue as it is, the rest as it was measured."""
+    measured, groups = kept("credibility")["measured"], list(runner.entries().values())
     rows = []
-    for one in kept("credibility")["measured"]["rows"]:
+    for one, claim in zip(measured["rows"], credibility.claims(), strict=True):
+        behind = credibility.verifying(claim, groups)
+        kinds, orders = (", ".join(part) for part in (_kinds(behind), _orders(behind)))
+        verified = f"{claim.closed_forms}; {kinds}" if kinds else claim.closed_forms
         met = (
             f"{found['met']} of {found['of']}" if found["of"] else "none"
             for found in (one["measurement"], one["model"])
         )
-        rows.append((one["quantity"], *met, one["bar"], " to ".join(one["band"]), one["grade"]))
-    measured = ("measurements within their uncertainty", "other models as near as asked for")
-    head = ("quantity", *measured, "numerical bar", "model band", "grade")
+        cells = (
+            verified,
+            orders or "none",
+            claim.other_codes,
+            *met,
+            _bias(one, measured["arms"] if claim.arms else []),
+        )
+        rows.append((one["quantity"], *cells, one["bar"], " to ".join(one["band"]) or "not known", one["grade"]))
+    verification = ("closed forms, and entries of the catalogue", "orders that must be met", "other codes")
+    experiment = ("measurements within their uncertainty", "other models as near as asked for", "bias and scatter")
+    head = ("quantity", *verification, *experiment, "numerical bar", "model band", "grade")
     return table("credibility", head, rows)
+
+
+def _kinds(behind: list[Entry]) -> list[str]:
+    return [f"{count} {kind}" for kind, count in sorted(Counter(str(one.kind) for one in behind).items())]
+
+
+def _orders(behind: list[Entry]) -> list[str]:
+    return [
+        number(order)
+        for order in sorted({one.refinement.order for one in behind if one.refinement and one.refinement.order})
+    ]
+
+
+def _bias(row: dict[str, Any], arms: list[dict[str, Any]]) -> str:
+    """The bias and scatter of the model beside measurements and the scatter of these: of moment arms in mm by case, else in
+    uncertainties of the experiments, orders left out.
+    """
+    if arms:
+        own = [one for one in arms if one["kind"] == "measurement"]
+        words = [f"`{one['case']}` {one['bias']:.1f} and {one['scatter']:.1f} mm" for one in own]
+        return f"{', '.join(words)}; scatter of the experiment and n not published"
+    beside = [one for one in row["beside"] if one["kind"] == "measurement" and not one["is_order"]]
+    if not beside:
+        return "none"
+    off = [(one["value"] - one["truth"]) / one["within"] for one in beside]
+    known = sorted({str(one["n"]) for one in beside if one["n"]}) or ["not known"]
+    scatter = f"{pstdev(off):.2g}" if len(off) > 1 else "none"
+    return f"{mean(off):.2g} and {scatter} of their uncertainty, over {len(off)}; n {', '.join(known)}"
 
 
 def _credibility_cubes() -> str:

@@ -89,9 +89,12 @@ def laws() -> str:
 
 
 def parameters() -> str:
-    """The parameters of every effect, in one table; the region of an effect is said beside it."""
-    rows = [f"| `{name}` | {'; '.join(map(_parameter, keys.items()))} |\n" for name, keys in _parameters().items()]
-    return "| effect | parameters |\n|---|---|\n" + "".join(rows)
+    """The formula and the parameters of every effect, in one table; the region of an effect is said beside it."""
+    rows = [
+        f"| `{name}` | {_formula(effects.find(name))} | {'; '.join(map(_parameter, keys.items()))} |\n"
+        for name, keys in _parameters().items()
+    ]
+    return "| effect | formula | parameters |\n|---|---|---|\n" + "".join(rows)
 
 
 def ranges() -> str:
@@ -154,6 +157,11 @@ GENERATED: dict[str, Callable[[], str]] = {
 def _parameters() -> dict[str, dict[str, Any]]:
     found = {name: _fields(records[0]) for name, records in effect_records().items()}
     return {name: {key: field for key, field in fields.items() if key != "in"} for name, fields in found.items()}
+
+
+def _formula(record: type[Record]) -> str:
+    """The first paragraph of the docstring of an effect."""
+    return _cell(_markdown(inspect.getdoc(record) or "").partition("\n\n")[0])
 
 
 _RAMP = "list of table RampPoint (at least 1)"

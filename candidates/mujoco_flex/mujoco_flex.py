@@ -1,7 +1,7 @@
 """MuJoCo's flexible bodies (Todorov et al. 2012): linear tetrahedra of St. Venant-Kirchhoff, implicit steps, one thread, SI units.
 
-It cannot take fibres, springs or a bulk modulus of its own (a Poisson's ratio of at most ``poisson`` stands for it), nor contact
-with bones that are not convex, which it would replace by their hulls: contact is left out.
+It cannot take fibres, springs, a bulk modulus of its own (a Poisson's ratio of at most ``poisson`` stands for it), or contact with
+bones that are not convex, which it would replace by their hulls: contact is left out.
 """
 
 import sys
@@ -57,4 +57,4 @@ class Flex:
 
 
 if __name__ == "__main__":
-    main(Flex, f"mujoco-{mujoco.__version__}", poisson=float)
+    main(Flex, "mujoco-core", poisson=float)

@@ -1,7 +1,5 @@
-"""Newton's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, penalty contact with meshes, one thread.
-
-Units: SI. It cannot take fibres, springs or a bulk modulus of its own: lambda of the scene's Poisson's ratio, at most ``poisson``,
-stands for it.
+"""Newton's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, penalty contact with meshes, one thread,
+SI units. It cannot take fibres, springs, or a bulk modulus of its own: a Poisson's ratio of at most ``poisson`` stands for it.
 """
 
 import sys
@@ -18,48 +16,39 @@ from scipy.spatial.transform import Rotation
 class Descent:
     """Particles at the vertices, kinematic where a bone holds them, and kinematic bodies with the bones' meshes."""
 
-    lost = ()
+    lost, kind, substeps = (), newton.solvers.SolverVBD, 1
 
-    def __init__(
-        self, scene: Scene, iterations: int, poisson: float, kind: type = newton.solvers.SolverVBD, substeps: int = 1
-    ) -> None:
-        wp.config.quiet = True
+    def __init__(self, scene: Scene, iterations: int, poisson: float) -> None:
         wp.set_device("cpu")
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+        mesh = {"vertices": [wp.vec3(*point) for point in scene.points], "indices": scene.tets.ravel().tolist()}
         material = {"density": DENSITY, "k_mu": scene.mu, "k_lambda": scene.lame(poisson)[1], "k_damp": 0.0}
         place = {"pos": wp.vec3(), "rot": wp.quat_identity(), "scale": 1.0, "vel": wp.vec3(), "particle_radius": 1e-4}
-        vertices = [wp.vec3(*point) for point in scene.points]
-        builder.add_soft_mesh(vertices=vertices, indices=scene.tets.ravel().tolist(), **place, **material)
+        builder.add_soft_mesh(**mesh, **place, **material)
         for vertex in scene.held:
-            builder.particle_flags[vertex] &= ~newton.ParticleFlags.ACTIVE
-            builder.particle_mass[vertex] = 0.0
-        self.bones, self.held, self.substeps = [bone.name for bone in scene.bones], scene.held, substeps
+            builder.particle_flags[vertex], builder.particle_mass[vertex] = 0, 0.0
+        self.bones, self.held = [bone.name for bone in scene.bones], scene.held
         for bone in scene.bones:
-            body = builder.add_body(xform=wp.transform(wp.vec3(), wp.quat_identity()), is_kinematic=True)
-            builder.add_shape_mesh(body, mesh=newton.Mesh(bone.points, bone.triangles.ravel()))
+            mesh = newton.Mesh(bone.points, bone.triangles.ravel())
+            builder.add_shape_mesh(builder.add_body(is_kinematic=True), mesh=mesh)
         builder.color()
         self.model = builder.finalize()
         self.model.soft_contact_ke, self.model.soft_contact_kd, self.model.soft_contact_mu = 1e3, 0.0, 0.0
-        self.solver = kind(self.model, iterations=iterations)
-        self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
-        self.pipeline = newton.CollisionPipeline(self.model)
-        self.contacts = self.pipeline.contacts()
+        self.solver, self.pipeline = self.kind(self.model, iterations=iterations), newton.CollisionPipeline(self.model)
+        self.now, self.next, self.contacts = self.model.state(), self.model.state(), self.pipeline.contacts()
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
         """Put bones and held vertices where they belong and go on by a share of a step."""
-        places = [
-            np.array([*bones[name][:3, 3], *Rotation.from_matrix(bones[name][:3, :3]).as_quat()]) for name in self.bones
-        ]
+        turns = {name: Rotation.from_matrix(bones[name][:3, :3]).as_quat() for name in self.bones}
         for state in (self.now, self.next):
             points = state.particle_q.numpy()
             points[self.held] = held
             state.particle_q.assign(points)
-            if places:
-                state.body_q.assign(np.array(places))
+            if turns:
+                state.body_q.assign(np.array([[*bones[name][:3, 3], *turn] for name, turn in turns.items()]))
         self.now.particle_qd.assign(self.now.particle_qd.numpy() * DAMPING ** (1 / self.substeps))
-        self.now.clear_forces()
         self.pipeline.collide(self.now, self.contacts)
-        self.solver.step(self.now, self.next, self.control, self.contacts, STEP / self.substeps)
+        self.solver.step(self.now, self.next, None, self.contacts, STEP / self.substeps)
         self.now, self.next = self.next, self.now
 
     def positions(self) -> np.ndarray:
@@ -68,4 +57,4 @@ class Descent:
 
 
 if __name__ == "__main__":
-    main(Descent, f"newton-{newton.__version__}", iterations=int, poisson=float)
+    main(Descent, "newton", iterations=int, poisson=float)

@@ -17,8 +17,11 @@ from newton_vbd import Descent
 class Constraints(Descent):
     """The same model by constraints, in ``substeps`` of each step."""
 
+    kind = newton.solvers.SolverXPBD
+
     def __init__(self, scene: Scene, substeps: int, iterations: int, poisson: float) -> None:
-        super().__init__(scene, iterations, poisson, newton.solvers.SolverXPBD, substeps)
+        self.substeps = substeps
+        super().__init__(scene, iterations, poisson)
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
         """Carry held vertices and bones over in sub-steps."""
@@ -28,4 +31,4 @@ class Constraints(Descent):
 
 
 if __name__ == "__main__":
-    main(Constraints, f"newton-{newton.__version__}", substeps=int, iterations=int, poisson=float)
+    main(Constraints, "newton", substeps=int, iterations=int, poisson=float)

@@ -1,12 +1,10 @@
-"""pbatoolkit's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, one thread, SI units.
-
-It cannot take fibres, springs or a bulk modulus of its own (lambda of the scene's Poisson's ratio, at most ``poisson``, stands
-for it, plus mu, as the lambda of its energy is not Lame's), nor bones that are not made of tetrahedra: contact is left out.
+"""pbatoolkit's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, one thread, SI units. It cannot take
+fibres, springs, a bulk modulus of its own (lambda of a Poisson's ratio of at most ``poisson`` stands for it, plus mu, as the lambda
+of its energy is not Lame's), or bones that are not made of tetrahedra: contact is left out.
 """
 
 import os
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"  # read when it is loaded
@@ -32,14 +30,12 @@ def meshed(data, scene: Scene):
 class Descent:
     """The integrator, whose fixed vertices are put where their bones are before each step."""
 
-    lost = ()
-    substeps = 1
+    lost, substeps = (), 1
 
     def __init__(self, scene: Scene, iterations: int, poisson: float) -> None:
         self.held, self.iterations = scene.held, iterations
-        self.integrator = self.made(
-            scene, *(np.full(len(scene.tets), one) for one in (scene.mu, scene.lame(poisson)[1] + scene.mu))
-        )
+        moduli = scene.mu, scene.lame(poisson)[1] + scene.mu
+        self.integrator = self.made(scene, *(np.full(len(scene.tets), one) for one in moduli))
 
     def made(self, scene: Scene, mu: np.ndarray, lame: np.ndarray):
         """The integrator for ``mu`` and ``lame`` (e,) [Pa]."""
@@ -49,10 +45,9 @@ class Descent:
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
         """Put the held vertices where they belong and go on by a step."""
-        points = np.array(self.integrator.x)
+        points = np.array(self.integrator.x, order="F")
         points[:, self.held] = held.T
-        self.integrator.x = np.asfortranarray(points)
-        self.integrator.v = np.asfortranarray(np.array(self.integrator.v) * DAMPING)
+        self.integrator.x, self.integrator.v = points, np.array(self.integrator.v, order="F") * DAMPING
         self.integrator.step(STEP, self.iterations, self.substeps)
 
     def positions(self) -> np.ndarray:
@@ -61,4 +56,4 @@ class Descent:
 
 
 if __name__ == "__main__":
-    main(Descent, f"pbatoolkit-{version('pbatoolkit')}", iterations=int, poisson=float)
+    main(Descent, "pbatoolkit", iterations=int, poisson=float)

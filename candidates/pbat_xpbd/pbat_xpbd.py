@@ -5,7 +5,6 @@ It cannot take what ``pbat_vbd`` cannot: fibres, springs, a bulk modulus of its 
 """
 
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[1] / "pbat_vbd")]
@@ -33,4 +32,4 @@ class Constraints(Descent):
 
 
 if __name__ == "__main__":
-    main(Constraints, f"pbatoolkit-{version('pbatoolkit')}", substeps=int, poisson=float)
+    main(Constraints, "pbatoolkit", substeps=int, poisson=float)

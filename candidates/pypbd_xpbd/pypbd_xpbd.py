@@ -1,8 +1,6 @@
-"""PositionBasedDynamics by XPBD (Bender et al. 2017): linear tetrahedra of St. Venant-Kirchhoff, one thread.
-
-Units: it works in cm, kg and s, as its library drops every tetrahedron whose determinant is at most 1e-6, in whatever unit; those
-that it drops in cm are counted and stated. It cannot take fibres, a bulk modulus of its own (a Poisson's ratio of at most
-``poisson`` stands for it) or springs; contact with bones is left out: it gives way by millimetres.
+"""PositionBasedDynamics by XPBD (Bender et al. 2017): linear tetrahedra of St. Venant-Kirchhoff, one thread. Units: cm, kg, s: it
+drops every tetrahedron whose determinant is at most 1e-6; those in cm are counted and stated. It cannot take fibres, springs, or a
+bulk modulus of its own (a Poisson's ratio of at most ``poisson`` stands for it); contact, soft there, is left out.
 """
 
 import os
@@ -25,8 +23,7 @@ class Tetrahedra:
     """Particles at the vertices, without mass where a bone holds them."""
 
     def __init__(self, scene: Scene, substeps: int, poisson: float) -> None:
-        simulation = pypbd.Simulation.getCurrent()
-        simulation.initDefault()
+        (simulation := pypbd.Simulation.getCurrent()).initDefault()
         self.model, self.program = simulation.getModel(), simulation.getTimeStep()
         tets, (young, _, ratio) = scene.tets.astype(np.uint32).ravel(), scene.lame(poisson)
         body = self.model.addTetModel(CM * scene.points, tets, testMesh=False, generateCollisionObject=False)
@@ -45,17 +42,13 @@ class Tetrahedra:
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
         """Carry the held vertices over in sub-steps of one iteration."""
-        begin, up = (
-            np.array([self.particles.getPosition(vertex) for vertex in self.held]),
-            np.array([0, GRAVITY * STEP / self.substeps, 0]),
-        )
+        begin = np.array([self.particles.getPosition(vertex) for vertex in self.held])
+        kept, up = DAMPING ** (1 / self.substeps), np.array([0, GRAVITY * STEP / self.substeps, 0])
         for step in range(1, self.substeps + 1):
             for vertex, point in zip(self.held, begin + step / self.substeps * (CM * held - begin), strict=True):
                 self.particles.setPosition(int(vertex), point)
             for vertex in self.free:
-                self.particles.setVelocity(
-                    vertex, self.particles.getVelocity(vertex) * DAMPING ** (1 / self.substeps) + up
-                )
+                self.particles.setVelocity(vertex, self.particles.getVelocity(vertex) * kept + up)
             self.program.step(self.model)
 
     def positions(self) -> np.ndarray:
@@ -64,4 +57,4 @@ class Tetrahedra:
 
 
 if __name__ == "__main__":
-    main(Tetrahedra, "pypbd-2.2.2", substeps=int, poisson=float)
+    main(Tetrahedra, "pypbd", substeps=int, poisson=float)

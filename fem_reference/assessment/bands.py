@@ -97,7 +97,8 @@ def _banded(
         keys = [one.key for one in design.parameters]
         first, total = (dict(zip(keys, map(float, one), strict=True)) for one in (surrogate.first, surrogate.total))
         found = np.quantile(predicted, PERCENTILES, axis=0)
-        return _filled(replace(band, by="surrogate", first=first, total=total), defined, found)
+        by = "polynomial" if isinstance(surrogate, Chaos) else "process"
+        return _filled(replace(band, by=by, first=first, total=total), defined, found)
     missed = f"the surrogate misses {100 * surrogate.error:.0f} % of the variance at runs that it was not fitted to"
     why = f"{missed}, more than {100 * WORST:.0f} %"
     if len(runs) < FEWEST:

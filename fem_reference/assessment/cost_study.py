@@ -121,7 +121,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_features(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` where a study lacks a feature, or it is none that a case can have."""
+    """Raise InputError below ``place`` where a study lacks a feature, or has one that no case can have."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")

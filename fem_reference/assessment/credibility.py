@@ -127,14 +127,20 @@ class Row:
         return "validated" if any(one.validates for one in self.beside) else "indicative"
 
 
+def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
+    """The ``entries`` of the catalogue that verify a ``claim``; LookupError where one of its groups does not exist."""
+    behind = [one for one in entries if one.group in claim.verified]
+    if missing := set(claim.verified) - {one.group for one in behind}:
+        raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
+    return behind
+
+
 def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
     """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
 
     KeyError where an experiment was not measured, LookupError where a group of the catalogue does not exist.
     """
-    behind = [one for one in entries if one.group in claim.verified]
-    if missing := set(claim.verified) - {one.group for one in behind}:
-        raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
+    behind = verifying(claim, entries)
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
     beside = [of_result(results[name]) for name in claim.experiments]
     beside += [of_arms(one) for one in arms] if claim.arms else []

@@ -44,7 +44,7 @@ class Judgement:
 
     @property
     def used(self) -> float:
-        """The used share of the allowed distance; infinite where that is no number."""
+        """The used share of the allowed distance; infinite where that is not a number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 

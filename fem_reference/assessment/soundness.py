@@ -21,7 +21,7 @@ def unsound(run: Run, reference: Run) -> str:
     """The first reason that the frames of a ``run`` (f, n, 3) [mm] give, with its frame; empty where they are an answer, and for a
     run without this surface. Only frames count that both reached, as others are not numbers.
     """
-    if run.positions.shape != reference.positions.shape:
+    if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # lines, or another surface
     if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
         return "unknown: no frame is of numbers alone"

@@ -6,24 +6,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from fem_reference.assessment.fronts import Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 
 # Of what is measured and how: rows of another number are stale.
-PROTOCOL = 2
+PROTOCOL = 3
 STATES = ("failed", "stale")
 # What rows are compared by, [mm]; its value in other units; and where it is matched: an error [mm], the time of a frame number [s].
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
 MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
-_COST = "seconds_per_frame"
 
 
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
-    empty for the reference, which has ``bars``. ``unsound``: why its frames are no answer. ``split``: by part the root mean square
-    [mm] of its error. ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
+    empty for the reference, which has ``bars``. ``from_rest``: root mean square [mm] from the first to the last frame where the
+    reference is back at rest. ``unsound``: why its frames are no answer. ``split``: by part the root mean square [mm] of its error.
+    ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
     ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
     True where case, reference, solver or protocol changed since.
     """
@@ -38,6 +37,7 @@ class Standing(Record):
     seconds_per_frame: float | None = None
     worst: dict[str, float | None]
     bars: dict[str, float]
+    from_rest: float | None = None
     split: dict[str, float]
     least_error: float | None = None
     least_time: float | None = None
@@ -124,13 +124,6 @@ class OverCases:
 def _error(row: Standing, name: str) -> float:
     value = row.worst.get(name)
     return math.inf if value is None or math.isnan(value) else value
-
-
-def matched(points: Iterable[Point]) -> tuple[float | None, float | None]:
-    """The least error [mm] of ``points`` of a solver within the matched time, and the least time [s] within the matched error."""
-    pairs = [pair for point in points if (pair := point.at(ERROR, _COST))]
-    errors, times = ([e for e, t in pairs if t <= MATCHED_TIME], [t for e, t in pairs if e <= MATCHED_ERROR])
-    return min(errors, default=None), min(times, default=None)
 
 
 def load(path: Path) -> tuple[Standing, ...]:

@@ -26,6 +26,9 @@ _CHECKOUT = Path(__file__).resolve().parents[2]  # or the folder that the packag
 def entry() -> None:
     """The installed command."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is running is cleaned up
+    os.environ.setdefault(
+        "OPENBLAS_NUM_THREADS", "1"
+    )  # read as numpy is loaded; on a busy machine more wait for each other
     sys.exit(main(sys.argv[1:]))
 
 

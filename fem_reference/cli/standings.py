@@ -19,7 +19,12 @@ PAGE = "standings"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("cases", metavar="CASE", nargs="*", help=f"a case (default: {', '.join(standings.CASES)})")
+    parser.add_argument(
+        "cases",
+        metavar="CASE",
+        nargs="*",
+        help=f"a case (default: {', '.join(standings.CASES)}; the last five need FEM_REFERENCE_DATA)",
+    )
     program = (
         "a folder NAME with a program NAME.py and its candidate.toml, such as candidates/newton_vbd; may be repeated"
     )
@@ -37,11 +42,12 @@ def run(options: argparse.Namespace) -> int:
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:
         raise InputError("--only", f'"{options.only}"', f"some of {','.join(STATES)}")
-    if options.submission and (options.quick or options.set):
-        raise InputError("--submission", "--quick or --set beside it", "the cases as they are published")
     cases = [muscle_case(case, options, quick=options.quick) for case in options.cases or standings.CASES]
     entrants = [standings.program(folder) for folder in options.program]
     entrants += [standings.submission(folder) for folder in options.submission]
+    if (options.quick or options.set) and any(one.case and not one.scene for one in entrants):
+        want = "the cases as they are published, or the scene that the export states in its candidate.toml"
+        raise InputError("--submission", "--quick or --set beside it", want)
     before = load(out(options) / f"{options.page_name or PAGE}.json")
     with fenicsx.shared():
         found = standings.stand(cases, out(options) / "runs", entrants, before, only)

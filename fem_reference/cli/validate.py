@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     facts |= of_case.known(scene, bench.setup())
     if scene.reference.solver == "fenicsx" and body is not None:
         cost = expected(body, bench.settings(scene.reference, "reference"))
-        time = f"about {duration(cost.seconds)} of processor time, within a factor of three"
-        facts |= {"unknowns": cost.unknowns, "cost": f"{time}, for {len(scene.numbers)} frames"}
+        time = f"about {duration(cost.seconds)} of processor time, within a factor of three, for {len(scene.numbers)} frames"
+        facts |= {"unknowns": cost.unknowns, "cost": f"{time}; {cost.megabytes / 1000:.1f} GB of memory"}
     write_output(facts, "\n".join([*lines(facts), f"{scene.name} can be solved"]), options)
     return DONE

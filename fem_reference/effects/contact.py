@@ -12,7 +12,8 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class Contact(Interaction):
-    """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
+    """A pressure of the gap g to each bone, its signed distance, negative inside: 0 beyond the ``smoothing`` d,
+    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper, k the ``stiffness`` (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
     distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the

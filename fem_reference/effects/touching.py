@@ -10,8 +10,8 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """A pressure of the gap between two muscles, on both alike, or between places of a single one, with any sliding; see
-    ``fem_reference.problems.touching.Touching`` for the law.
+    """The pressure of ``contact``, of the gap between two muscles, on both alike, or between places of a single one, with any
+    sliding (``fem_reference.problems.touching.Touching``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the two, or the two places, overlap by at most p / stiffness. ``smoothing`` [mm]:
     the distance below which a muscle is felt, and the most by which it may overlap another, or itself, at rest. ``friction``: the

@@ -42,5 +42,11 @@ def new_folder(folder: Path) -> Iterator[Path]:
 def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
     """Write the text of a ``file`` of this folder, by default that of the same name, with facts of the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
-    known = {"title": case.title, "name": case.name, "version": __version__, "first": str(case.numbers[0])}
+    known = {
+        "title": case.title,
+        "name": case.name,
+        "version": __version__,
+        "first": str(case.numbers[0]),
+        "scene": case.key,
+    }
     files.write_text(path, template.substitute(known | values))

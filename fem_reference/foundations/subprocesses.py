@@ -51,7 +51,7 @@ def _watch(process: int) -> None:
 
 
 def lives(process: int) -> bool:
-    """True for a process that runs; one that ended and whose end nobody has taken note of does not live."""
+    """True for a process that runs; a zombie does not."""
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
@@ -62,7 +62,7 @@ def lives(process: int) -> bool:
 
 
 def forget_peak_memory() -> None:
-    """Watch the memory of this process anew, which may have been larger before; Linux can."""
+    """Measure the peak memory of this process from now on, where the system can (Linux)."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 

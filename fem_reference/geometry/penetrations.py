@@ -18,7 +18,7 @@ from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.geometry.skins import edge_lengths, quartered
+from fem_reference.geometry.skins import edge_lengths
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
 # So many winding numbers take as long as a tree for them.
@@ -32,6 +32,8 @@ _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
 _TOO_MANY = 1e6
 # The number of rounds of subdivision, the most cubes after each, and the most points drawn in them.
 _ROUNDS, _MOST = 3, 8000
+# The quarters of a triangle, among its corners and the middles of the edges that leave these.
+_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 # A triangle is sampled in parts of down to an eighth of its size.
 _PARTINGS = 3
 
@@ -224,9 +226,11 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) ->
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True
-        longest = edge_lengths(corners).max(axis=1)
-        corners = quartered(corners[away.min(axis=1) < longest])
-        away = distance(corners.reshape(-1, 3)).reshape(-1, 3)
+        near = away.min(axis=1) < edge_lengths(corners).max(axis=1)
+        middles = (corners[near] + np.roll(corners[near], -1, axis=1)) / 2  # of the edge that leaves each corner
+        between = distance(middles.reshape(-1, 3)).reshape(-1, 3)
+        corners = np.concatenate([corners[near], middles], axis=1)[:, _QUARTERS].reshape(-1, 3, 3)
+        away = np.concatenate([away[near], between], axis=1)[:, _QUARTERS].reshape(-1, 3)
     return bool((away < 0).any())
 
 

@@ -4,7 +4,8 @@ from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIM
 from fem_reference.metrics import described
 from fem_reference.report.pages import Page
 
-COLUMNS = tuple((".".join(key), one.label, one.full_unit) for key, one in described("solvers").items())
+_SHOWN = (*described("solvers").items(), (("joint_moment", "moment"), described()["joint_moment", "moment"]))
+COLUMNS = tuple((".".join(key), one.label, one.full_unit) for key, one in _SHOWN)
 
 
 def page(found: Standings) -> Page:

@@ -93,7 +93,7 @@ class MusclesCase(Case):
 
     @property
     def decides(self) -> list[Any]:
-        """Causes of verdicts, as of one muscle; what is expected of a muscle is none."""
+        """The causes of verdicts, as for one muscle. Expectations of single muscles are not among them."""
         judged = self.model_copy(update={"expect": tuple(one for muscle in self.muscle for one in muscle.expect)})
         return [self.determining(), *super(MusclesCase, judged).decides[1:]]
 

@@ -46,7 +46,7 @@ def unit(case: Case, key: str) -> str:
 
 
 def read(case: Case, key: str, value: str | float) -> float:
-    """A ``value`` for the number at a ``key``, as scene files write it or in its unit inside; InputError where it is none."""
+    """A ``value`` for the number at a ``key``, as scene files write it or in its unit inside; InputError where it has none."""
     field = _field(case, key)
     kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     try:

@@ -39,7 +39,7 @@ def left_out(case: MuscleCase) -> list[str]:
 
 
 def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
-    """The ends of a range of the number at a ``key``, in its unit inside; InputError at ``place`` where they are none."""
+    """The ends of a range of the number at a ``key``, in its unit inside; InputError at ``place`` where they are not numbers."""
     found = []
     for name in ("low", "high"):
         try:

@@ -3,24 +3,45 @@
 import hashlib
 import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from typing import Any, cast
 
-import numba
 import platformdirs
+
+
+class _Compiled:
+    """A function as machine code, which is made, and numba imported, when it is called or another one that calls it is compiled."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.function = function
+
+    def __call__(self, *values: Any) -> Any:
+        return self.machine_code(*values)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self.machine_code._numba_type_
+
+    @cached_property
+    def machine_code(self) -> Any:
+        """Its function of numba."""
+        import numba
+
+        if not can_keep(kept_code()):
+            return numba.njit(error_model="numpy")(self.function)
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(kept_code())  # numba reads it here and never again for this function
+        try:
+            return numba.njit(cache=True, error_model="numpy")(self.function)
+        finally:
+            numba.config.CACHE_DIR = before
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
     """The function as machine code, made at its first call and kept on disk, where that can be written; it runs on one thread."""
-    if not can_keep(kept_code()):
-        return cast(F, numba.njit(error_model="numpy")(function))
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(kept_code())  # numba reads it here and never again for this function
-    try:
-        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
-    finally:
-        numba.config.CACHE_DIR = before
+    return cast(F, _Compiled(function))
 
 
 @cache
@@ -41,7 +62,7 @@ def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
     A compiled function contains those that it calls. numba checks only a function's own file for changes,
-    hence one folder for each version of all loops together.
+    so each version of all loops together has a folder.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):

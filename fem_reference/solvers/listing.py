@@ -137,7 +137,7 @@ def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]
 def right_side(points: Floats) -> Floats:
     """Listing 4.5, line 17: (n dim,), 1 for every component of the ``points`` (n, dim) whose y is above average, else 0.
 
-    The mean is summed from the first point to the last, as Octave does, lest a point at the average fall on the other side.
+    The mean is summed from the first point to the last, as Octave does, so that a point at the average falls on the same side.
     """
     y = points[:, 1]
     return np.repeat((y > np.cumsum(y)[-1] / len(y)).astype(np.float64), points.shape[1])

@@ -3,7 +3,7 @@
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every sub-iteration is a
 full step of the algorithm. No external force acts, so the time step cancels: in place of velocities the displacements of vertices
 in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the result depends on the order of
-the vertices, since constraints are projected one after the other. Collisions are found anew in every sweep; line 13 finds them
+the vertices, since constraints are projected one after the other. Collisions are found again in every sweep; line 13 finds them
 once.
 """
 

@@ -56,7 +56,7 @@ class RecordedSettings(Record):
 class About(Record):
     """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
     on so many threads, and in words what of the scene was ``left_out``. For standings: the ``group`` of its method, the ``case`` of
-    these frames, and a ``sha256`` by name of each file, which is checked.
+    these frames, the key ``scene`` that its export states, and a ``sha256`` by name of each file, which is checked.
     """
 
     name: FileName | None = None
@@ -67,6 +67,7 @@ class About(Record):
     left_out: tuple[str, ...] = ()
     group: str | None = None
     case: Name | None = None
+    scene: str | None = None
     sha256: dict[FileName, str] = Field(default_factory=dict)
 
     @property

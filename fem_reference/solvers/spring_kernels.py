@@ -1,6 +1,6 @@
 """Masses and springs, compiled: their forces and their steps in time. Report section 5.5.1.
 
-Units: mm, N, s and tonne. Arrays should be writable and C-contiguous: each other kind is compiled for anew.
+Units: mm, N, s and tonne. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
 """
 
 import math

@@ -1,5 +1,6 @@
 """Numbers known of a case before it is solved: features, by which cases are compared, and the cost of its reference."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers.fenicsx import resources
+from fem_reference.solvers.fenicsx.settings import BodySettings
 
 # Measured on hip_flexion: seconds of processor time of one of Newton's iterations with so many unknowns, the exponent by which it
 # grows, and iterations a frame.
@@ -21,17 +23,21 @@ _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
 
 
 class ExpectedCost(NamedTuple):
-    """The size of a problem, and the processor time [s] that FEniCSx takes for it, within a factor of three."""
+    """The size of a problem, the processor time [s] that FEniCSx takes for it, within a factor of three, and its memory [MB]."""
 
     unknowns: int
     seconds: float
+    megabytes: float
 
 
 def expected(body: Body, settings: Record) -> ExpectedCost:
     """The cost of a muscle as a ``body`` by FEniCSx with these ``settings``."""
-    count = resources.unknowns(body.mesh, str(settings.model_dump()["element"]))
+    assert isinstance(settings, BodySettings)  # those of FEniCSx
+    count = resources.unknowns(body.mesh, settings.element)
+    chosen = resources.planned(settings, body.mesh, math.inf)
     wanted = sum(frame >= body.first for frame in body.frames)
-    return ExpectedCost(count, _SECONDS * float((count / _UNKNOWNS) ** _EXPONENT) * _ITERATIONS * (wanted - 1))
+    seconds = _SECONDS * float((count / _UNKNOWNS) ** _EXPONENT) * _ITERATIONS * (wanted - 1)
+    return ExpectedCost(count, seconds, resources.memory(count, str(chosen.linear_solver), str(chosen.precision)))
 
 
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:

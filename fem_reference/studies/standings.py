@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.assessment import standings
-from fem_reference.assessment.fronts import Point
 from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.assessment.soundness import unsound
-from fem_reference.assessment.standings import PROTOCOL, Standing, Standings
+from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, PROTOCOL, Standing, Standings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.foundations.version import __version__
@@ -29,16 +28,20 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# The cases of our own geometry.
-CASES = ("hip_flexion", "box_squeeze", "box_squeeze_report")
+# Our own, which need nothing, and those of the report's anatomy.
+CASES = ("hip_flexion_tendon", *table_5_1.SCENARIOS)
 # The machine of frames that were submitted with their time.
 THEIRS = "as stated by its authors"
+# How far [mm] (rms) the reference may be from rest at the last frame for solvers to be asked how far they are.
+_BACK = 0.1
+# What is measured: beside deviations of shape, the moment about the joint where a solver has forces.
+_METRICS = (*in_tables(), "joint_moment")
 
 
 @dataclass(frozen=True)
 class Entrant:
     """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it ``takes``; ``case``:
-    the only one that it has frames of, empty for all.
+    the only one that it has frames of, empty for all; ``scene``: the key of the one that they were exported of, empty if not known.
     """
 
     candidate: Candidate
@@ -47,6 +50,7 @@ class Entrant:
     law: str | None = None
     takes: tuple[str, ...] = ()
     case: str = ""
+    scene: str = ""
 
 
 def program(folder: Path) -> Entrant:
@@ -69,7 +73,9 @@ def submission(folder: Path) -> Entrant:
         if path.name != recorded.ABOUT and path.name not in said.sha256:
             raise InputError(f"{place}: sha256", f"no {path.name}", "every file beside it")
     candidate = recorded.choice(folder, None, "--submission")
-    return Entrant(candidate, said.group or table_5_1.FOREIGN, said.version or "", case=said.case or "")
+    return Entrant(
+        candidate, said.group or table_5_1.FOREIGN, said.version or "", case=said.case or "", scene=said.scene or ""
+    )
 
 
 def stand(
@@ -130,6 +136,8 @@ def _on(
         try:
             if name in taken and one not in ours:
                 raise InputError(name, "the name of a solver of ours", "another name")
+            if one.scene not in ("", case.key):
+                raise InputError(f"{name}: scene", f'"{one.scene}"', f'"{case.key}", which it is now')
             key = measured.key(one)
             old = known.get(name)
             if old is not None:
@@ -170,10 +178,10 @@ class _Measured:
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
         """The row of a run of this ``key``."""
         own = run is self.reference
-        worst = {} if own else cost.greatest(run, self.reference, self.context, in_tables())
+        worst = {} if own else cost.greatest(run, self.reference, self.context, _METRICS)
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
         submitted = one.candidate.solver == "recorded"  # its time is of another machine
-        least = standings.matched([] if submitted else [_point(run, one, worst, seconds)])
+        error, time = worst.get(ERROR, np.nan), np.nan if seconds is None or submitted or why else seconds
         return Standing(
             case=self.bench.scene.name,
             group=one.group,
@@ -185,9 +193,10 @@ class _Measured:
             seconds_per_frame=seconds,
             worst={name: value if np.isfinite(value) else None for name, value in worst.items()},
             bars=cost.known(refinement.stored(run)) if own else {},
+            from_rest=_from_rest(run, self.reference),
             split={} if why or own else self._split(one, run),
-            least_error=None if why or own else least[0],
-            least_time=None if why or own else least[1],
+            least_error=error if np.isfinite(error) and time <= MATCHED_TIME else None,
+            least_time=time if np.isfinite(time) and error <= MATCHED_ERROR else None,
             truth=self.truth,
             run=key,
             frames=hashlib.sha256(np.ascontiguousarray(run.positions).tobytes()).hexdigest(),
@@ -208,7 +217,7 @@ class _Measured:
             return {}
 
 
-def _point(run: Run, one: Entrant, worst: dict[str, float], seconds: float | None) -> Point:
-    costs = {} if seconds is None else {"seconds_per_frame": seconds}
-    named = str(run.origin.get("case", "")), one.candidate.solver, run.name
-    return Point(*named, "", "", {}, run.outcome.status, "", worst, costs)
+def _from_rest(run: Run, reference: Run) -> float | None:
+    """Return the distance [mm] (rms) from the first to the last frame; None where the reference does not come back."""
+    away = [np.sqrt(np.mean(np.sum((one.positions[-1] - one.positions[0]) ** 2, axis=1))) for one in (run, reference)]
+    return float(away[0]) if away[1] <= _BACK and np.isfinite(away[0]) else None

@@ -30,7 +30,7 @@ def test_the_band_of_a_linear_problem_is_exact() -> None:
     values = (own.points @ [0.5, 1.0])[:, None] * [0.0, 1.0, 2.0] + 3
     found = of_values(empty(), own, values)
     tail = 1.5 - np.sqrt(4 * 0.05)
-    assert (found.by, found.refused) == ("surrogate", "")
+    assert (found.by, found.refused) == ("polynomial", "")
     assert found.low == pytest.approx([3, 3 - tail, 3 - 2 * tail], abs=5e-3)
     assert found.median == pytest.approx([3, 3, 3], abs=5e-3)
     assert found.high == pytest.approx([3, 3 + tail, 3 + 2 * tail], abs=5e-3)
@@ -110,7 +110,7 @@ def test_what_a_polynomial_misses_has_the_shares_of_a_process() -> None:
     x, y = own.points.T
     found = of_values(empty(), own, (np.tanh(8 * x) * (2 + y))[:, None] * [0.5, 1.0, 1.0])
     assert (found.by, found.error < 0.05 < chaos.fit(own.points, np.tanh(8 * x)[:, None] * (2 + y)[:, None]).error) == (
-        "surrogate",
+        "process",
         True,
     )
     assert list(found.first.values()) == pytest.approx([12 / 13, 0], abs=0.02)

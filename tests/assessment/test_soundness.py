@@ -70,6 +70,12 @@ def test_a_run_that_says_it_converged_without_a_frame_is_no_answer() -> None:
     assert unsound(replace(nothing, outcome=Outcome("crashed", "at once")), TRUTH) == ""
 
 
+def test_lines_without_a_surface_are_an_answer() -> None:
+    lines = replace(run(MOVED[1]), has_surface=False, positions=np.full_like(MOVED, NAN))
+    assert unsound(lines, TRUTH) == ""
+    assert unsound(replace(lines, has_surface=True), TRUTH) == "unknown: no frame is of numbers alone"
+
+
 def test_it_is_not_ranked_and_named_on_the_page(tmp_path, monkeypatch) -> None:
     found = with_bars(small_comparison(tmp_path, monkeypatch))
     assert "quick" in {place.deviation.name for one in found.rankings for place in one.places}

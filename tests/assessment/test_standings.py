@@ -5,8 +5,7 @@ import math
 
 import pytest
 
-from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.standings import ERROR, PROTOCOL, SHARE, Standing, Standings, changes, load, matched
+from fem_reference.assessment.standings import ERROR, PROTOCOL, SHARE, Standing, Standings, changes, load
 from fem_reference.foundations.errors import InputError
 
 KEYS = {"truth": "t1", "run": "r1", "frames": "f", "date": "2026-01-01", "machine": "m", "protocol": PROTOCOL}
@@ -59,14 +58,6 @@ def test_kept_rows_are_stale_by_protocol_or_a_missing_case_and_count_nowhere() -
     assert row("a", stale=True).kept(missing=False).stale
     rows = (row("a", 1.0, "x"), row("a", 9.0, "y", stale=True), row("b", stale=True))
     assert [(one.name, one.count, one.share) for one in Standings(rows=rows, missing={}).overall()] == [("a", 1, 10.0)]
-
-
-def test_matched_are_the_least_error_in_time_and_the_least_time_within_error() -> None:
-    pairs = ((9.0, 0.001), (1.5, 0.05), (1.0, 0.5), (0.2, 3.0))
-    points = [Point("c", "s", "s", "", "", {}, "converged", "", {ERROR: e}, {"seconds_per_frame": t}) for e, t in pairs]
-    assert matched(points) == (1.5, 0.05)  # in 0.1 s, for 2 mm
-    assert matched(points[2:]) == (None, 0.5)
-    assert matched([]) == (None, None)
 
 
 def test_changes_beyond_the_error_bar_are_said() -> None:

@@ -100,3 +100,5 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     code = "import sys, fem_reference.cli; print(*({'dolfinx', 'gmsh', 'pyvista', 'vtk', 'meshio', 'numba'} & set(sys.modules)))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded == []
+    code = "import sys, fem_reference.solvers as s; assert s.names('solve'); print('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

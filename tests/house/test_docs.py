@@ -19,11 +19,13 @@ from browser import PROGRAM, Browser
 import fem_reference as fr
 from fem_reference import effects, metrics, solvers
 from fem_reference.cli import parser
+from fem_reference.export import febio
 from fem_reference.foundations.records import keys, parse
 from fem_reference.runs.contents import Status
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers.fenicsx import processes
 
 
 def listed(page: str, heading: str) -> list[str]:
@@ -51,6 +53,27 @@ def test_every_effect_of_a_muscle_is_in_the_table() -> None:
     table = text[text.index("| effect |") :].split("\n\n")[0]
     first = "".join(row.split("|")[1] for row in table.splitlines())
     assert sorted(re.findall(r"`(\w+)`", first)) == effects.names()
+
+
+def test_what_febio_has_of_each_effect_is_what_is_exported() -> None:
+    """A law that is no longer written would else stay in the table, and a new one be missing there."""
+    text = pages.page("docs/effects.md")
+    rows = [row.split(" | ") for row in text[text.index("| effect |") :].split("\n\n")[0].splitlines()[2:]]
+    written = {name for row in rows if row[-1].startswith("`") for name in re.findall(r"`(\w+)`", row[0])}
+    assert written == {effects.name_of(kind) for kind in febio.SAME}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
+def test_the_recipe_of_an_ordinary_muscle_can_be_solved(tmp_path: Path) -> None:
+    """Its last frames on unrefined tetrahedra, with its volume kept."""
+    (text,) = (text for name, text in pages.snippets("toml") if name == "docs/ordinary_muscle.md")
+    table = tomllib.loads(text)
+    table["muscle"]["refinements"], table["frames"]["every"] = 0, 50
+    case = fr.make_case(table, name="ordinary_muscle")
+    run = fr.solve(case, store=tmp_path)
+    assert run.outcome.status == "converged"
+    assert fr.compare(case, run, []).word in ("pass", "doubtful pass")
 
 
 def test_every_key_of_every_record_is_in_the_reference() -> None:

@@ -230,7 +230,7 @@ def test_rigid_motion_costs_nothing(name):
 
 
 def test_machine_code_is_kept_by_what_all_loops_are_and_numba_is_left_as_it_was() -> None:
-    assert Path(kernels.distance.stats.cache_path).parent == kept_code()
+    assert Path(kernels.distance.machine_code.stats.cache_path).parent == kept_code()
     assert not numba.config.CACHE_DIR
 
 

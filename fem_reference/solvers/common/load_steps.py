@@ -72,7 +72,7 @@ def march(
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (at rest, or where the run continues) through every frame. ``attempt`` solves at a load from the last
     converged state, and must restore that state where it fails. A frame whose earlier state ``recall`` can take up needs no step.
-    Before giving up, the loop asks ``last_resort`` for another way to solve; where it returns True, load steps begin anew.
+    Before giving up, the loop asks ``last_resort`` for another way to solve; where it returns True, load steps begin again.
     Ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest

@@ -1,21 +1,26 @@
 """Compilation of forms for this machine: one process at a time compiles a form, and removes incomplete files of it before."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import CDLL
 from functools import wraps
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 import ffcx.codegeneration.jit as generator
 import ufl
-from dolfinx import fem, jit
+from dolfinx import cpp, default_scalar_type, fem, jit
 from ffcx import naming
 from filelock import FileLock
-from ufl.algorithms import expand_derivatives
+from ufl.algorithms import expand_derivatives, extract_coefficients
+from ufl.algorithms.analysis import extract_constants, extract_type
+from ufl.algorithms.signature import compute_expression_signature
+from ufl.classes import Label
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
+from ufl.domain import extract_domains
 
 from fem_reference.foundations import native
 
@@ -52,8 +57,9 @@ def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
     @wraps(search)
     def found(name: str, objects: list[str], cache_dir: Path, timeout: int) -> R:
         source = Path(cache_dir, f"{name}.c")
-        libraries, marks = list(source.parent.glob(f"{name}.*so")), (source, source.with_suffix(".c.cached"))
-        if not (libraries and all(path.exists() for path in marks)):
+        libraries = [source.with_suffix(ending) for ending in EXTENSION_SUFFIXES]
+        marks = source, source.with_suffix(".c.cached")
+        if not (any(path.exists() for path in libraries) and all(path.exists() for path in marks)):
             for path in (*libraries, *marks):
                 path.unlink(missing_ok=True)
         return search(name, objects, cache_dir, timeout)
@@ -71,16 +77,63 @@ def form(expression: Any) -> Any:
     return fem.form(expression, jit_options=OPTIONS)
 
 
+class _Code(NamedTuple):
+    """A compiled expression, its ``module``, and the places of what it reads among the functions and constants of its formula."""
+
+    expression: Any
+    module: Any
+    functions: tuple[int, ...]
+    constants: tuple[int, ...]
+
+
+class BoundExpression(fem.Expression):  # type: ignore[misc]  # its parameters of type are those of its values
+    """A compiled expression that reads the functions and constants of one body."""
+
+    def __init__(self, code: _Code, functions: Sequence[Any], constants: Sequence[Any]) -> None:
+        ffi = code.module.ffi
+        read = [functions[i]._cpp_object for i in code.functions], [constants[i]._cpp_object for i in code.constants]
+        self._argument_space = None
+        address = ffi.cast("uintptr_t", ffi.addressof(code.expression))
+        self._cpp_object = cpp.fem.create_expression_float64(address, *read, [], None)
+
+
+_codes: dict[tuple[str, str, tuple[int, ...]], tuple[_Code, ...]] = {}  # by the hash of the formulas
+
+
 def expression(value: Any, points: Any) -> Any:
-    """A compiled expression at reference ``points`` (q, 3)."""
-    return fem.Expression(_expanded(value), points, jit_options=OPTIONS)
+    """A compiled expression of a ``value`` at reference ``points`` (q, 3)."""
+    return _bound(value, points, ())[0]
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
     """Compiled expressions at reference ``points`` (q, 3): the ``first`` ones of the scalars ``values``, and all of them."""
-    whole = _expanded(ufl.as_vector(values))
-    parts = ufl.as_vector(whole.ufl_operands[:first])
-    return tuple(fem.Expression(one, points, jit_options=OPTIONS) for one in (parts, whole))
+    whole, part = _bound(ufl.as_vector(values), points, (first,))
+    return part, whole
+
+
+def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
+    """A compiled ``value`` at reference ``points`` (q, 3), and its ``firsts`` components. A formula is differentiated and found
+    among the compiled ones once: what another body has of it differs in functions and constants alone, in the same order.
+    """
+    functions, constants = extract_coefficients(value), extract_constants(value)
+    labels = sorted(extract_type(value, Label), key=Label.count)
+    known = (functions, constants, labels, extract_domains(value))
+    numbers = {one: i for kind in known for i, one in enumerate(kind)}
+    key = compute_expression_signature(value, numbers), points.tobytes().hex(), firsts
+    if key not in _codes:
+        whole = _expanded(value)
+        parts = [ufl.as_vector(whole.ufl_operands[:count]) for count in firsts]
+        _codes[key] = tuple(_code(one, points, functions, constants) for one in (whole, *parts))
+    return [BoundExpression(code, functions, constants) for code in _codes[key]]
+
+
+def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -> _Code:
+    (domain,) = extract_domains(value)
+    options = {"form_compiler_options": {"scalar_type": default_scalar_type}, "jit_options": OPTIONS}
+    code, module, _ = jit.ffcx_jit(domain.ufl_cargo().comm, (value, points), **options)
+    own = extract_coefficients(value)
+    read = [own[code.original_coefficient_positions[i]] for i in range(code.num_coefficients)]
+    return _Code(code, module, tuple(map(functions.index, read)), tuple(map(constants.index, extract_constants(value))))
 
 
 def _expanded(value: Any) -> Any:

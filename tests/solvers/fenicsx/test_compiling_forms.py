@@ -23,6 +23,23 @@ for size in (1.0, 2.0):
     mesh = shapes.box((1, 1, 1), (size, size, size), "tetrahedron")
     AssembledBody(Body(mesh, (make("neo_hooke", mu=size),), (), (0.0, 1.0)), BodySettings(element="P1"))
     print("compiled", len(list(Path(sys.argv[1]).rglob("*.so"))), flush=True)
+
+import numpy
+import ufl
+from dolfinx import fem
+from fem_reference.solvers.fenicsx import compiling
+
+cell, middle = numpy.zeros(1, numpy.int32), numpy.full((1, 3), 0.25)
+for a, b, exponent in ((2, 3, 2), (5, 7, 2), (5, 7, 3)):
+    for swapped in (False, True):
+        domain = AssembledBody(Body(mesh, (make("neo_hooke", mu=1.0),), (), (0.0, 1.0)), BodySettings(element="P1")).mesh
+        first, second = (fem.Constant(domain, float(value)) for value in (a, b))
+        field = fem.Function(fem.functionspace(domain, ("Lagrange", 1)))
+        field.x.array[:] = a + b
+        x = ufl.variable(first * field)
+        slope = ufl.diff(second * x**exponent if not swapped else x * second**exponent, x)
+        value = compiling.expression(slope, middle).eval(domain, cell)[0, 0]
+        print("value", value / (b**exponent if swapped else b * exponent * (a * (a + b)) ** (exponent - 1)), flush=True)
 """
 
 
@@ -86,3 +103,6 @@ def test_a_second_body_of_the_same_effects_compiles_nothing(tmp_path: Path) -> N
     found = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=300)
     first, second = (int(line.split()[1]) for line in found.stdout.splitlines() if line.startswith("compiled"))
     assert second == first > 2
+    # Of each formula the present constants and functions are read, those of other bodies and formulas never.
+    values = [float(line.split()[1]) for line in found.stdout.splitlines() if line.startswith("value")]
+    assert values == pytest.approx([1.0] * 6, rel=1e-14)

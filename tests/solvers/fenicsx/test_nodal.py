@@ -78,6 +78,7 @@ def test_det_F_is_what_the_run_recorded_at_the_vertices(turned) -> None:
 @pytest.fixture(scope="module")
 def integrated(turned):
     """Means over the bent bar by the rule that it was solved with: (mean of the pressure, of det F, of P = J sigma F^-T)."""
+    from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
     from fem_reference.solvers.fenicsx.meshes import with_vertices
 
     problem, frames, _ = turned
