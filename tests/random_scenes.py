@@ -180,7 +180,7 @@ def text(seed: int, choice: str = "auto") -> tuple[str, Polylines]:
         "bulk": 1000 * mu,
         "activation": 0.0 if rng.uniform() < 0.15 else between(1e-5, 0.3),
         "passive": between(30, 600),
-        "slack": rng.uniform(0.97, 1.1),
+        "slack": rng.uniform(1.0, 1.1),
         "density": between(1e-3, 1e5),
         "weight": ", ".join(f"{9.81 * x:.4f}" for x in unit(rng.normal(size=3))),
         "pressure": between(1e-4, 0.3) * mu,

@@ -2,16 +2,19 @@
 
 import numpy as np
 
-from fem_reference.effects import Effect, Ramped, in_situ
+from fem_reference.effects import Effect, PassiveFibres, Ramped, in_situ
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, check_once, check_used, join
 from fem_reference.scenes import regions
 from fem_reference.scenes.muscle import Frames, MuscleCase
 
 # What a load acts on, where it is no attachment: the surface that is not attached to bone.
 FREE = "free"
+# The stretch of fibres of the given length, but for a little.
+_GIVEN = 1 - 1e-5
 
 
 def check_names(case: MuscleCase) -> None:
@@ -54,12 +57,24 @@ def check_rest(case: MuscleCase) -> None:
             got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
             want = '0 there, where the muscle rests, or the effect "in_situ", which balances it'
             raise InputError(join(case.place, f"effect[{i}].ramp"), got, want)
+    _check_slack(case)
     for i, bone in enumerate(case.bone):
         pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
             slid = np.array_equal(pose[:3, :3], np.eye(3))
             what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
             raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
+
+
+def _check_slack(case: MuscleCase) -> None:
+    """Check that passive fibres pull in the given shape only beside a stress at rest that balances them."""
+    for i, effect in enumerate(case.effects):
+        # Beside the given length, as laws have a kink there.
+        pull = fibre_tension(effect.energy, _GIVEN) if isinstance(effect, PassiveFibres) else 0.0
+        if not pull <= 0 and in_situ.among(case.effects) is None:
+            want = 'slack ones, as by an optimal_stretch of at least 1, or the effect "in_situ", which balances them'
+            got = f"fibres under {1e3 * pull:.3g} kPa in the given shape"
+            raise InputError(join(case.place, f"effect[{i}]"), got, want)
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:

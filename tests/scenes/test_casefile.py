@@ -244,6 +244,22 @@ def test_a_muscle_in_situ_may_have_a_tone_and_supports_at_rest(bar: Path) -> Non
         changed(bar, "effect", [*given[:3], contact | {"friction": 0.3}])
 
 
+def test_passive_fibres_are_slack_in_the_given_shape_but_in_situ(bar: Path) -> None:
+    """Fibres that the given shape stretches would pull at the first frame, where a muscle rests."""
+    matrix = {"name": "neo_hooke", "mu": "10 kPa"}
+    law = {"name": "fibre_passive", "stress": "300 kPa", "p1": 0.05, "p2": 6.6, "linear_from": 1.4}
+    for optimal in (1.0, 1.2):
+        assert (
+            changed(bar, "effect", [matrix, law | {"optimal_stretch": optimal}]).effects[1].optimal_stretch == optimal
+        )
+    tense = [matrix, law | {"optimal_stretch": 0.9}]
+    with pytest.raises(
+        InputError, match=r"effect\[1\]: got fibres under 18 kPa in the given shape, want slack ones, .*in_situ"
+    ):
+        changed(bar, "effect", tense)  # 300 kPa 0.05 (exp(6.6 (1 / 0.9 - 1)) - 1) / 0.9
+    changed(bar, "effect", [*tense, {"name": "in_situ", "stretch": 1.05}])
+
+
 def test_a_change_that_leads_nowhere_says_what_there_is(bar: Path) -> None:
     for key, wanted in {
         "bone.lid.unit": r"; there are bone\[0\] \(\w+\), bone\[1\] \(\w+\)$",
