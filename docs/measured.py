@@ -10,6 +10,7 @@ import json
 import os
 import platform
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -64,7 +65,7 @@ def _make(measurement: Measurement, path: Path) -> None:
     """Measure, and write the JSON of the verb to ``path``; that of several cases by their names, also where one has no solution."""
     found = {}
     for case in measurement.cases or ("",):
-        words = measurement.command.replace("CASE", case).split()[1:]
+        words = shlex.split(measurement.command.replace("CASE", case))[1:]
         words = [sys.executable, "-m", "fem_reference", *words, "--out", str(path.parent), "--json", str(path)]
         subprocess.run(words, cwd=ROOT, check=not case)
         found[case] = json.loads(path.read_text(encoding="utf-8"))

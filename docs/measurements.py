@@ -25,6 +25,14 @@ _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 # Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
 _FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
+_ARMS = ("mean", "least", "greatest")
+# Frames of a hip that turns from rest to -0.3 rad and on to 0.3 rad, a hundredth of a radian a frame.
+_POSES = {30: "at -17 degrees", 60: "at rest", 90: "at 17 degrees"}
+_TURNED = (
+    "./fem run CASE --set muscle.refinements=0 --set expect=[] --set frames.last=90 --set bone[2].motion.axis={} --set "
+    """'bone[2].motion.keyframes=[{{frame=0,angle="0rad"}},{{frame=30,angle="-0.3rad"}},{{frame=90,angle="0.3rad"}}]'"""
+)
+_TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
 
 
 class Measurement(NamedTuple):
@@ -204,6 +212,25 @@ def _credibility_arms() -> str:
         rows.append((f"`{one['case']}`", beside, f"{100 * one['share']:.0f} %", one["poses"], *offsets))
     head = ("case", "beside", "inside, or covered", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
     return table("credibility", head, rows)
+
+
+def _arms_about(found: dict[str, Any]) -> Any:
+    rows = []
+    for case, one in found.items():
+        own = [each for each in one["measures"] if each["candidate"] == "reference" and each["metric"] == "moment_arm"]
+        arms = {f"{each['statistic']} {each['frame']}": each["value"] for each in own}
+        kept = {name: arms[name] for at in _POSES for name in (f"{which} {at}" for which in _ARMS) if name in arms}
+        rows.append({"case": case, "status": one["status"], "arms": kept})
+    return rows
+
+
+def _arms_about_rows(file: str) -> str:
+    rows = []
+    for one in kept(file)["measured"]:
+        found = ([one["arms"].get(f"{which} {at}") for which in _ARMS] for at in _POSES)
+        cells = (one["status"] if None in arm else "{:.1f} ({:.1f} to {:.1f})".format(*arm) for arm in found)
+        rows.append((f"`{one['case']}`", *cells))
+    return table(file, ("case", *(f"{angle}, mm" for angle in _POSES.values())), rows)
 
 
 def _uncertainty(found: dict[str, Any]) -> Any:
@@ -450,6 +477,8 @@ MEASUREMENTS = {
     ),
     "stress": Measurement("./fem stress --steps", _stress),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
+    "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
+    "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
     "credibility": Measurement("./fem page credibility", _credibility),
     "table_5_1": Measurement(
         "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
@@ -472,6 +501,8 @@ TABLES = {
     "credibility_grades": _credibility_grades,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,
+    "arms_adduction": partial(_arms_about_rows, "arms_adduction"),
+    "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),

@@ -59,6 +59,25 @@ def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
     assert kept["ends"] == [{"case": "twist", "verdict": "ok", "frame": 5, "off": off}]
 
 
+def test_arms_about_an_axis_are_those_of_the_reference_and_a_pose_that_was_not_reached_has_the_status(
+    monkeypatch,
+) -> None:
+    """Arms of candidates are differences from those of the reference, and so are not arms."""
+    values = {"mean": 2.0, "least": -1.0, "greatest": 4.0, "rms": 3.0}
+    own = [
+        {"candidate": who, "metric": "moment_arm", "statistic": name, "frame": frame, "value": value + frame + off}
+        for who, off in (("reference", 0.0), ("pbd", 50.0))
+        for name, value in values.items()
+        for frame in (30, 50, 60)
+    ]
+    keep = measurements.MEASUREMENTS["arms_rotation"].keep
+    kept = {"measured": keep({"hip": {"status": "diverged", "measures": own}})}
+    monkeypatch.setattr(measurements, "kept", lambda _: kept)
+    monkeypatch.setattr(measurements, "origin", lambda _: "here")
+    row = measurements.TABLES["arms_rotation"]().splitlines()[2]
+    assert row == "| `hip` | 32.0 (29.0 to 34.0) | 62.0 (59.0 to 64.0) | diverged |"
+
+
 def test_every_solver_has_as_many_hard_cases() -> None:
     found = measurements.kept("stress")["measured"]
     assert len({sum(count for count in one.values() if isinstance(count, int)) for one in found["counts"]}) == 1

@@ -64,6 +64,15 @@ def test_poses_are_those_in_which_the_published_arm_is_known() -> None:
     assert [one["poses"] for one in credibility_page.facts(replace(found(), arms=(made, partly)))["arms"]] == [10, 3]
 
 
+def test_the_row_of_arms_has_the_range_of_biases_and_each_case_stands_below_once(tmp_path) -> None:
+    """One sentence for all measured cases: seven of them in a narrow cell made the first table four times as tall."""
+    several = (arms(10, 20, (15, 15)), arms(10, 20, (18, 18)), arms(10, 20, (40, 60), "iliacus"))
+    page = credibility_page.page(replace(found(), arms=several))
+    text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text()).replace("\u202f", " ")
+    assert "bias -3.0 to 0.0 mm beside measurements" in text
+    assert text.count("bias 0.0 mm, scatter 0.0 mm over the 10 of 10 poses") == 1
+
+
 def test_a_fit_is_met_by_the_same_uncertainty_and_unknown_without_a_value() -> None:
     (fit,), one = found().fits, found().rows[0].beside[0]
     assert credibility_page.met(fit.values, one) is True
