@@ -3,7 +3,7 @@
 import gc
 import importlib.util
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -119,3 +119,33 @@ def fem_lab():
 
     with lab() as opened:
         yield opened
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """An option under which a skipped test or file is a failure, as for the extras."""
+    parser.addoption("--none-skipped", action="store_true", help="a skipped test fails, with its reason")
+
+
+def _refuse_skip(report: pytest.TestReport | pytest.CollectReport, config: pytest.Config) -> None:
+    """Turn a skipped ``report`` into a failed one under ``--none-skipped``; an expected failure stays."""
+    if config.getoption("--none-skipped") and report.skipped and not hasattr(report, "wasxfail"):
+        why = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        report.outcome, report.longrepr = "failed", f"none may be skipped here: {why}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Refuse a skipped test."""
+    report = yield
+    _refuse_skip(report, item.config)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Refuse a skipped file."""
+    report = yield
+    _refuse_skip(report, collector.config)
+    return report
