@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from statistics import mean, pstdev
+from statistics import mean, median, pstdev
 from typing import Any, NamedTuple
 
 from fem_reference.assessment import cost_study, credibility, fronts
@@ -32,6 +32,7 @@ _TURNED = (
     "./fem run CASE --set muscle.refinements=0 --set expect=[] --set frames.last=90 --set bone[2].motion.axis={} --set "
     """'bone[2].motion.keyframes=[{{frame=0,angle="0rad"}},{{frame=30,angle="-0.3rad"}},{{frame=90,angle="0.3rad"}}]'"""
 )
+_PROGRAMS = ("newton_vbd", "mujoco_flex", "pbat_vbd", "pbat_xpbd", "pypbd_xpbd", "drake_fem")
 _TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
 
 
@@ -456,6 +457,45 @@ def _cell(one: dict[str, Any] | None, name: str) -> str:
     return "not applicable" if value is None else number(abs(value) if one["kind"] == "FEM" else value, 2)
 
 
+def _standings(found: dict[str, Any]) -> Any:
+    kept_keys = ("case", "group", "name", "version", "status", "unsound", "seconds_per_frame", "split")
+    return [{key: row[key] for key in kept_keys} | {"rms": row["worst"].get(_SURFACE)} for row in found["rows"]]
+
+
+def _standings_rows() -> str:
+    """By solver its error on each case; in bold where it is no answer."""
+    rows = [row for row in kept("standings")["measured"] if row["rms"] is not None]
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    found = []
+    for group, name in dict.fromkeys((row["group"], row["name"]) for row in rows):
+        own = {row["case"]: row for row in rows if row["name"] == name}
+        times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"]]
+        time = f"{1e3 * median(times):.3g} ms" if times else "-"
+        found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
+    return table("standings", ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
+
+
+def _standing(row: dict[str, Any] | None) -> str:
+    if row is None:
+        return "-"
+    return (
+        f"**{row['unsound'].split(':')[0] or row['status']}**"
+        if row["unsound"] or row["status"] != "converged"
+        else f"{row['rms']:.3g}"
+    )
+
+
+def _standings_parts() -> str:
+    """By program with a law of its own, the parts of its error on each case that could be split."""
+    rows = [row for row in kept("standings")["measured"] if row["split"]]
+    names = list(dict.fromkeys(name for row in rows for name in row["split"]))
+    found = [
+        (f"`{row['name']}`", f"`{row['case']}`", f"{row['rms']:.3g}", *(f"{row['split'][name]:.2g}" for name in names))
+        for row in rows
+    ]
+    return table("standings", ("solver", "case", "error", *names), found)
+
+
 MEASUREMENTS = {
     "verify": Measurement("./fem verify", _verify),
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
@@ -479,6 +519,9 @@ MEASUREMENTS = {
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
     "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
+    "standings": Measurement(
+        "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS), _standings
+    ),
     "credibility": Measurement("./fem page credibility", _credibility),
     "table_5_1": Measurement(
         "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
@@ -503,6 +546,8 @@ TABLES = {
     "credibility_arms": _credibility_arms,
     "arms_adduction": partial(_arms_about_rows, "arms_adduction"),
     "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
+    "standings_solvers": _standings_rows,
+    "standings_parts": _standings_parts,
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
