@@ -21,7 +21,12 @@ import reference_pages
 from measurements import KEPT, MEASUREMENTS, TABLES, Measurement
 
 ROOT = Path(__file__).resolve().parent.parent
-WRITTEN = TABLES | {"effect_parameters": reference_pages.parameters}
+WRITTEN = TABLES | {
+    "effect_parameters": reference_pages.parameters,
+    "scene_keys": reference_pages.scenes,
+    "file_keys": reference_pages.files,
+    "solver_settings": reference_pages.settings,
+}
 _PLACE = re.compile(r"(<!-- (?:measured|written): (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

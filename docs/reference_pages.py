@@ -140,9 +140,6 @@ def notebooks() -> str:
 
 
 GENERATED: dict[str, Callable[[], str]] = {
-    "scenes": scenes,
-    "files": files,
-    "solvers": settings,
     "effects": laws,
     "ranges": ranges,
     "verbs": verbs,

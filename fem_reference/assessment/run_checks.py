@@ -27,7 +27,7 @@ from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
 # A position is correct up to this share of the body's size; rounding of stored values is a thousandth of it.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 # Attached vertices deviate from their bone by strain times their distance from the attached facets: stretch up to 4.
 _STRAIN = 3.0
 # Factor on the mean extension of springs from the recorded force: they pull at other points of the surface.
@@ -41,7 +41,7 @@ _OWN = 0.5
 # Contact gives way where a bone is deeper than this share of half its thickness, for any stiffness.
 _GIVEN_WAY = 0.75
 # The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
-_BALANCE = 10.0
+BALANCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
-            off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * facets_away
+            off, allowed = np.linalg.norm(away, axis=1), ROUNDING * size + _STRAIN * facets_away
             yield _at(
                 f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
             )
@@ -208,7 +208,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else what
     the bones carry of these. An effect of a user's own may be such a load, so that nothing is known with one.
     """
-    residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
+    residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
     own = all(type(one).__module__.startswith("fem_reference.effects.") for one in problem.effects)
     outer = any(one.outer for one in problem.effects)
@@ -219,7 +219,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
         carriers = vector_names(run.scalars, f"{kind}_on_")  # bones, and muscles that may touch it
         carried = np.sum([getattr(run, kind)(name) for name in carriers], axis=0)
         for i, load in _loads(problem, run, kind) if outer and carriers else ():
-            off, rounding = (float(np.linalg.norm(one)) for one in (carried[i] - load, _ROUNDING * load))
+            off, rounding = (float(np.linalg.norm(one)) for one in (carried[i] - load, ROUNDING * load))
             yield RunCheck(f"{kind}s that bones do not carry", off, allowed * arm + rounding, unit, run.numbers[i])
 
 
@@ -234,7 +234,7 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are not at rest, and of all earlier frames."""
-    seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], _ROUNDING * diagonal(run.surface.points)
+    seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)

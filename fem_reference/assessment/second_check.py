@@ -9,7 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from fem_reference.assessment import neighbours, run_checks
-from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle
+from fem_reference.assessment.body_balance import balance
+from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle, worst
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry import interpenetration
@@ -91,4 +92,4 @@ def confirmed_body(body: Body, solved: Run) -> Run:
     """A solution of a ``body``, denied where the check denies that it converged."""
     if solved.outcome.status != "converged":
         return solved
-    return replace(solved, outcome=confirmed(solved.outcome, of_body(body, solved)))
+    return replace(solved, outcome=confirmed(solved.outcome, (*of_body(body, solved), *worst(balance(body, solved)))))

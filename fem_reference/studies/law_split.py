@@ -18,8 +18,8 @@ from fem_reference.studies.execution import Bench
 _LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
 # The shear modulus, in bulk moduli, beside a law without resistance to shear at rest, where its equilibrium is not unique.
-# It moves the end of a bar that turns by 1 rad by 1e-3 mm.
-_WEAK = 1e-5
+# It moves the end of a bar that turns by 1 rad by 0.02 mm; a tenth of it does not always converge.
+_WEAK = 1e-4
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fem_reference import effects
+from fem_reference.assessment.body_balance import balance
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.assessment.run_checks import of_body, of_muscle
 from fem_reference.foundations.records import parse
@@ -121,6 +122,17 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
+def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
+    """The number of balances that the pressed blocks do not meet, where a share of the force that moves them is ``lost``."""
+    body = pressed_blocks(BLOCK_STIFFNESS)
+    run = lab.solve(body, "P2/P1", first_step=0.5)
+    forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}
+    run = replace(run, states=(*run.states[:-1], replace(run.last, forces=forces)))
+    checks = [one for one in balance(body, run) if one.frame == body.frames[-1]]
+    wrong = [str(one) for one in checks if not one.met]
+    return Finding(float(len(wrong)) if checks else np.nan, note="; ".join(wrong))
+
+
 def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **mistake: object) -> Entry:
     return Entry(
         name=f"second_check_{name}",
@@ -143,4 +155,5 @@ BLOCKS = "two blocks pressed together"
 ENTRIES = (
     *(_entry(name, BAR, words, denials, mistake=mistake) for name, words, mistake in MISTAKES),
     _entry("touching", BLOCKS, "the side of one 0.1 mm farther in the other", touching_denials, farther=0.1),
+    _entry("balance", BLOCKS, "a thousandth of one recorded force lost", unbalanced, lost=1e-3),
 )

@@ -85,6 +85,7 @@ LAWS: dict[str, Callable[[float], float]] = {
     "collagen_across": collagen,
     "st_venant_kirchhoff": st_venant,
     "stable_neo_hooke": lambda s: 0.01 * (s - s**-2),
+    "squared_invariants": lambda s: 0.02 * (s**2 + 2 / s - 3) * (s - s**-2),
 }
 STRETCHES = (0.3, 0.5, 0.7, 0.9, 1.05, 1.2, 1.37, 1.5, 1.6, 1.7, 1.8)
 

@@ -82,7 +82,9 @@ def test_everybody_stands_with_provenance_and_what_holds_is_kept(monkeypatch) ->
     assert rows["mine"]["status"] == "converged"
     assert rows["mine"]["unsound"] == ""
     assert rows["mine"]["machine"] == "as stated by its authors" != rows["still"]["machine"]
-    assert rows["still"]["least_time"] == rows["still"]["seconds_per_frame"] > 0
+    assert rows["still"]["least_time"] == rows["still"]["seconds_per_frame"] > 0  # it is 0.2 mm off
+    assert rows["mine"]["least_error"] is rows["mine"]["least_time"] is None  # its time is not of this machine
+    assert rows["still"]["from_rest"] is None  # nor is the reference back at rest
     assert rows["still"]["unsound"].startswith("stuck: ") is False  # the reference moves by 0.2 mm alone
     assert all(row["date"] and row["machine"] and len(row["frames"]) == 64 for row in first["rows"])
     assert first["missing"] == {}
@@ -143,6 +145,11 @@ def test_a_submission_is_of_one_case_as_it_was_published(place, capsys) -> None:
     for words in (("--quick",), ("--set", "reference.newton_iterations=7")):
         assert cli.main(["standings", "./bar", "--submission", "mine", *words]) == cli.BAD_INPUT
         assert "--submission: got --quick or --set" in capsys.readouterr().err
+    key = casefile.read_muscle("./bar", {"reference.newton_iterations": 7}).key
+    submit(place / "mine", scene=key)
+    assert ERROR in stand("--submission", "mine", "--set", "reference.newton_iterations=7")["rows"][1]["worst"]
+    submit(place / "mine", scene="of another one")
+    assert f'got "of another one", want "{key}"' in stand("--submission", "mine")["missing"]["bar, mine"]
     submit(place / "mine", case="baar", seconds_per_frame="")
     found = stand("--submission", "mine")
     assert found["missing"] == {"baar, mine": "this case is not asked, only bar"}

@@ -1,0 +1,83 @@
+"""The balance of the recorded forces on a body, without the solver's residual: by its boundary conditions, bones and dead loads."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from fem_reference.assessment.run_checks import BALANCE, ROUNDING, RunCheck
+from fem_reference.effects import region_of
+from fem_reference.foundations.mesh import Floats, corner_areas
+from fem_reference.problems.body import Body, Cells
+from fem_reference.runs.store import Frame, Run
+
+
+def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
+    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also that of moments about the origin. Nothing
+    where it is not fully known: a body that begins moved or under tension; effects of a user's own, follower loads, inertia or
+    drag; loads on cells other than straight tetrahedra; regions that share a prescribed component, whose force counts in each.
+    """
+    residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)
+    allowed, outer = BALANCE * residual * math.sqrt(unknowns), any(one.outer for one in body.effects)
+    for state in () if body.begun else solved.states[1:]:  # the first one is given, as contact or loads may find it
+        load = _load(body, state.number)
+        if load is None or not math.isfinite(allowed) or not _counted_once(body, state):
+            return
+        rounding = ROUNDING * (float(np.abs(list(state.forces.values())).sum()) + float(np.abs(load).sum()))
+        most, off = allowed + rounding, float(np.linalg.norm(_sum(state.forces) + load))
+        yield RunCheck("forces out of balance", off, most, "N", state.number)
+        if not outer:
+            arm, off = float(np.abs(state.points).max()), float(np.linalg.norm(_sum(state.moments)))
+            yield RunCheck("moments out of balance", off, most * arm, "N mm", state.number)
+
+
+def _sum(vectors: dict[str, Floats]) -> Floats:
+    return np.sum([np.zeros(3), *vectors.values()], axis=0)
+
+
+def _counted_once(body: Body, state: Frame) -> bool:
+    """True where a ``state`` has every force on a ``body``, and none twice."""
+    others = {bone.name for bone in body.bones} | {name for law in body.touching for name in law.forces}
+    names = {entry.name for entry in body.prescribed}
+    if names & others or not names <= set(state.forces) or set(state.forces) != set(state.moments):
+        return False
+    regions = [(set(one.components), body.mesh.facets[one.on]) for one in body.prescribed if isinstance(one.on, str)]
+    pairs = combinations(regions, 2)
+    return not any(along & other and len(np.intersect1d(on, near)) for (along, on), (other, near) in pairs)
+
+
+def _load(body: Body, frame: float) -> Floats | None:
+    """The force (3,) [N] of external loads at a frame; None where it is not known from the shape at rest."""
+    if not all(type(one).__module__.startswith("fem_reference.effects.") for one in body.effects):
+        return None
+    acting, mesh = [one for one in body.effects if one.outer], body.mesh
+    if acting and (mesh.kind != "tetrahedron" or mesh.degree > 1 or any(map(region_of, acting))):
+        return None
+    found = [(one.amount(frame), one.resultant(_AtRest(mesh))) for one in acting]
+    forces = [amount * load.force for amount, load in found if load is not None]
+    return None if len(forces) < len(acting) else np.sum([np.zeros(3), *forces], axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class _AtRest:
+    """The shape at rest of straight tetrahedra, as a :class:`fem_reference.foundations.loads.Shape`."""
+
+    mesh: Cells
+
+    def measure(self, on: str | None = None) -> tuple[float, Floats]:
+        """The volume [mm3] or an area [mm2]; the present positions are not known."""
+        if on is not None:
+            return float(corner_areas(self.mesh.points[self.mesh.facets[on]]).sum()), np.full(3, np.nan)
+        corners = self.mesh.points[self.mesh.cells]
+        volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+        return float(volumes.sum()), np.full(3, np.nan)
+
+    def facing(self, on: str) -> None:  # noqa: ARG002
+        """Nothing: the present shape is not known."""
+        return
+
+    def motion(self) -> None:
+        """Nothing: the velocity is not known."""
+        return
