@@ -293,6 +293,29 @@ def _omissions(found: dict[str, Any]) -> Any:
     return rows
 
 
+_MOVED = {
+    "surface_deviation.rms": "surface, rms",
+    "surface_deviation.max": "surface, greatest",
+    "fibre_length.rms_percent": "fibre length, rms",
+    "volume.deviation": "volume",
+}
+
+
+def _collagen(found: dict[str, Any]) -> Any:
+    (left,) = (one for one in found["ablations"][0]["omissions"] if one["left_out"] == ["collagen_across"])
+    return {name: _only(of, _MOVED) for name, of in (("changes", left["changes"]), ("bars", found["bars"]))}
+
+
+def _collagen_rows() -> str:
+    """The change of each statistic, and its error bar; KeyError where one is missing."""
+    measured, units = kept("collagen")["measured"], ("mm", "mm", "%", "%")
+    rows = [
+        (name, *(f"{number(measured[name][key], 2)} {unit}" for key, unit in zip(_MOVED, units, strict=True)))
+        for name in ("changes", "bars")
+    ]
+    return table("collagen", ("", *_MOVED.values()), rows)
+
+
 def _omission_rows() -> str:
     rows = []
     for one in kept("effects")["measured"]:
@@ -500,6 +523,12 @@ MEASUREMENTS = {
     "verify": Measurement("./fem verify", _verify),
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
+    "collagen": Measurement(
+        "./fem effects adductor_brevis --set muscle.refinements=0 --set frames.last=100 --set frames.every=20 "
+        """--set candidate=[] --set expect=[] --set 'effect=[{name="neo_hooke",mu="10kPa"},{name="incompressible",bulk="10MPa"},"""
+        """{name="contact",stiffness="500kPa/mm",smoothing="0.3mm"},{name="collagen_across",k1="200kPa",k2=1.5}]'""",
+        _collagen,
+    ),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "fibre_ends": Measurement(
         "./fem run CASE --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --set expect=[]",
@@ -534,6 +563,7 @@ TABLES = {
     "hip_flexion_worst": _comparison_worst,
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
+    "collagen": _collagen_rows,
     "study_reference": _study_reference,
     "fronts_solvers": _fronts_rows,
     "fibre_ends": _fibre_ends_rows,
