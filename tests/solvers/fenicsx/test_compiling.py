@@ -1,6 +1,7 @@
 """Compilation leaves a process that is asked to stop the time to clean up, and searches no incomplete files."""
 
 import signal
+from importlib.machinery import EXTENSION_SUFFIXES
 
 import pytest
 
@@ -8,7 +9,7 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 
 from fem_reference.solvers.fenicsx import compiling
 
-COMPLETE = ["form.c", "form.c.cached", "form.cpython-312.so"]
+COMPLETE = ["form.c", "form.c.cached", f"form{EXTENSION_SUFFIXES[0]}"]
 
 
 def test_a_process_that_is_asked_to_stop_raises(monkeypatch) -> None:
