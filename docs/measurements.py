@@ -327,7 +327,7 @@ def _omission_rows() -> str:
         ]
         time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
         rows.append((name, *changes, time, one["verdict"] or one["status"]))
-    return table("effects", ("left out", "surface, rms", "fibre length, rms", "volume", "time", ""), rows)
+    return table("effects", ("left out", "surface, rms", "fibre length, rms", "volume", "time left", ""), rows)
 
 
 def _study(found: dict[str, Any]) -> Any:
