@@ -205,6 +205,7 @@ ADDED = {
     "own solvers as commands, load of the machine, answers first": 880,
     "laws of other people's solvers, split errors, standings": 700,
     "a data set to learn from": 460,
+    "anatomy out of downloads": 110,
 }
 
 

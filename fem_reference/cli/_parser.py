@@ -77,12 +77,12 @@ def share(parser: argparse.ArgumentParser, *names: str) -> None:
 
 def names() -> list[str]:
     """The names of all verbs."""
-    return sorted(path.stem for path in _FOLDER.glob("*.py") if not path.stem.startswith("_"))
+    return sorted(path.stem.replace("_", "-") for path in _FOLDER.glob("*.py") if not path.stem.startswith("_"))
 
 
 def verb(name: str) -> ModuleType:
     """The module of a verb."""
-    return importlib.import_module(f"{__package__}.{name}")
+    return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
@@ -93,7 +93,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
         # The purpose of a verb is read from its file, as importing it takes long.
-        body = ast.parse((_FOLDER / f"{name}.py").read_bytes()).body
+        body = ast.parse((_FOLDER / f"{name.replace('-', '_')}.py").read_bytes()).body
         assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
         text = ast.literal_eval(assigned["HELP"])
         sub = kinds.add_parser(name, help=text, description=text)

@@ -60,7 +60,9 @@ def test_no_option_of_any_verb_is_left_out(scripts) -> None:
         assert sorted(offered(scripts["bash"], "fem-reference", verb, "--")) == sorted(
             option for option in wanted if option.startswith("--")
         )
-        in_zsh = re.search(rf"_shtab_fem_reference_{verb}_options=\((.*?)\n\)", scripts["zsh"], re.DOTALL)
+        in_zsh = re.search(
+            rf"_shtab_fem_reference_{verb.replace('-', '_')}_options=\((.*?)\n\)", scripts["zsh"], re.DOTALL
+        )
         assert in_zsh is not None
         in_fish = "\n".join(line for line in scripts["fish"].splitlines() if re.search(rf"\b{verb}\b", line))
         for option in wanted:

@@ -187,7 +187,7 @@ print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu *
 '''.lstrip()
 
 VERB = '''
-"""The verb ``added_verb``: how many cases there are."""
+"""The verb ``added-verb``: how many cases there are."""
 
 import argparse
 
@@ -215,9 +215,9 @@ KINDS = {
         {"tests/cli/test_verbs.py": 3},
         {
             "fem_reference --help": "how many cases there are",
-            "fem_reference added_verb": " cases",
-            "fem_reference added_verb --names --quiet": "hip_flexion",
-            "!fem_reference added_verb --no-such-option": "--no-such-option",
+            "fem_reference added-verb": " cases",
+            "fem_reference added-verb --names --quiet": "hip_flexion",
+            "!fem_reference added-verb --no-such-option": "--no-such-option",
         },
     ),
     "effect": New(
@@ -309,7 +309,7 @@ def test_one_new_file_or_folder_is_all_that_commands_need(kind: str, copy: Path)
 def test_one_new_file_or_folder_is_all_that_tests_need(copy: Path) -> None:
     files = [file for new in KINDS.values() for file in new.tested]
     status, output = printed_by(
-        ["pytest", "-q", "-rA", *files, "-k", "added_ or zero or (solvers and test_init)"], copy
+        ["pytest", "-q", "-rA", *files, "-k", "added_ or added-verb or zero or (solvers and test_init)"], copy
     )
     assert status == 0, output
     passed = collections.Counter(re.findall(r"^PASSED (tests/[^:]+)::", output, re.MULTILINE))

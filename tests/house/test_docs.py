@@ -31,7 +31,7 @@ from fem_reference.solvers.fenicsx import processes
 def listed(page: str, heading: str) -> list[str]:
     """The names at the beginning of rows of the first table of a page whose head begins with ``heading``."""
     text = pages.page(page)
-    return re.findall(r"^\| `(\w+)", text[text.index(f"| {heading} |") :].split("\n\n")[0], re.MULTILINE)
+    return re.findall(r"^\| `([\w-]+)", text[text.index(f"| {heading} |") :].split("\n\n")[0], re.MULTILINE)
 
 
 def test_tables_list_what_there_is() -> None:
@@ -103,7 +103,7 @@ def test_every_public_name_verb_and_case_is_in_the_reference() -> None:
     assert re.findall(r"^## (\w+)$", reference_pages.api(), re.MULTILINE) == fr.__all__
     assert re.findall(r"^## (\w+)$", reference_pages.gallery(), re.MULTILINE) == fr.cases()
     (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    assert re.findall(r"^### (\w+)$", reference_pages.verbs(), re.MULTILINE) == sorted(verbs.choices)
+    assert re.findall(r"^### (\S+)$", reference_pages.verbs(), re.MULTILINE) == sorted(verbs.choices)
     places = re.findall(r"<!-- generated: (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
     assert sorted(places) == sorted(reference_pages.GENERATED)
 
