@@ -118,8 +118,15 @@ def api() -> str:
     return "\n".join(_automatic(name) for name in fr.__all__)
 
 
+def cases() -> str:
+    """The shipped cases in one table."""
+    read = map(casefile.read, casefile.cases())
+    rows = "".join(f"| `{one.name}` | {_cell(one.title)} | {'yes' if one.needed_data else ''} |\n" for one in read)
+    return "| case | title | needs data |\n|---|---|---|\n" + rows
+
+
 def gallery() -> str:
-    """The shipped cases."""
+    """The shipped cases, one by one."""
     return "\n".join(_shown(casefile.read(name)) for name in casefile.cases())
 
 
