@@ -4,7 +4,6 @@
 """
 
 import argparse
-import base64
 import inspect
 import json
 import re
@@ -26,6 +25,7 @@ from fem_reference.foundations.records import Record, keys
 from fem_reference.foundations.units import LENGTH_UNITS, length_unit, unit_of
 from fem_reference.problems import of_case
 from fem_reference.report import gallery as gallery_of_runs
+from fem_reference.report.embedded import picture_source
 from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -232,7 +232,7 @@ def _pictures(case: Any) -> str:
         views = gallery_of_runs.draw(rest, rest.surface, [gallery_of_runs.Shot("rest", 0, rest.surface.points)])[0]
     except fr.MissingSoftware:
         return ""
-    kept = (f"data:image/webp;base64,{base64.b64encode(view).decode()}" for view in views)
+    kept = (picture_source(view) for view in views)
     return "".join(f'<img src="{one}" alt="{case.name} at rest" width="48%">\n' for one in kept) + "\n"
 
 
