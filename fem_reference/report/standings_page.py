@@ -11,7 +11,9 @@ COLUMNS = tuple((".".join(key), one.label, one.full_unit) for key, one in _SHOWN
 def page(found: Standings) -> Page:
     """The page of standings."""
     longest = max((sum(row.split.values()) for row in found.rows), default=0.0)
+    limits = sorted({row.time_limit for row in found.rows if row.time_limit is not None})
     contents = {
+        "limits": [f"{limit:g} s" for limit in limits],
         "found": found,
         "columns": COLUMNS,
         "longest": longest or 1.0,
@@ -31,8 +33,7 @@ def text(found: Standings) -> str:
 
 def _line(row: Standing) -> str:
     value, bar = row.worst.get(ERROR), row.bars.get(ERROR)
-    ended = row.unsound or row.status
-    parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {ended}{' (stale)' if row.stale else ''}"]
+    parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {row.ended}{' (stale)' if row.stale else ''}"]
     parts += [] if value is None or row.failed else [f"surface rms {value:.3g} mm"]
     parts += [] if bar is None else [f"surface rms known to {bar:.2g} mm"]
     parts += [f"{name} {part:.3g} mm" for name, part in row.split.items()]

@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 
 # Effects of a case that the law of a solver stands for.
-_LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
+LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
 # The shear modulus, in bulk moduli, beside a law without resistance to shear at rest, where its equilibrium is not unique.
 # It moves the end of a bar that turns by 1 rad by 0.02 mm; a tenth of it does not always converge.
@@ -37,9 +37,9 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
     """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``; InputError
     where it has no such law, or laws of regions.
     """
-    found = moduli([one for one in case.effects if name_of(one) in _LAW])
+    found = moduli([one for one in case.effects if name_of(one) in LAW])
     if (found.shear, found.bulk) != (moduli(case.effects).shear, moduli(case.effects).bulk):
-        raise InputError(case.place, "shear or bulk modulus of another effect", f"those of {', '.join(_LAW)} alone")
+        raise InputError(case.place, "shear or bulk modulus of another effect", f"those of {', '.join(LAW)} alone")
     if regions_named(case.effects) or not min(found.shear, found.bulk) > 0:
         raise InputError(case.place, "laws of regions, or no shear or bulk modulus", "one law of the whole muscle")
     mu, bulk = found.shear, found.bulk
@@ -64,7 +64,7 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
     held = tuple(one.model_copy(update={"stiffness": None}) for one in case.attachment)
-    whole = [one for one in case.effects if name_of(one) in _LAW]
+    whole = [one for one in case.effects if name_of(one) in LAW]
     own = [law] if moduli([law]).shear else [law, make("neo_hooke", mu=_WEAK * moduli([law]).bulk)]
     for effects, element in ((whole, ""), (own, "P2"), (own, "P1")):
         choice = case.reference.model_copy(update={"element": element}) if element else case.reference
