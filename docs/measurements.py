@@ -508,6 +508,24 @@ def _standing(row: dict[str, Any] | None) -> str:
     )
 
 
+def _learned_rows() -> str:
+    """By solver its mean distance on poses and on shapes that were not learned from."""
+    rows = kept("learned")["measured"]
+    counts = {row["split"]: f"{row['split']}s not seen, {row['muscles']} muscles" for row in rows}
+    found = []
+    for name in sorted(
+        {row["solver"] for row in rows}, key=lambda name: [row["error"] for row in rows if row["solver"] == name]
+    ):
+        own = {row["split"]: row for row in rows if row["solver"] == name}
+        lost = {split: f", {len(row['lost'])} not solved" for split, row in own.items() if row.get("lost")}
+        cells = [
+            f"{row['error']:.2f} mm, {number(row['seconds'] / row['muscles'], 2)} s{lost.get(split, '')}"
+            for split, row in own.items()
+        ]
+        found.append(("Learned" if own["pose"]["learned"] else "Not learned", f"`{name}`", *cells))
+    return table("learned", ("kind", "solver", *counts.values()), found)
+
+
 def _standings_parts() -> str:
     """By program with a law of its own, the parts of its error on each case that could be split."""
     rows = [row for row in kept("standings")["measured"] if row["split"]]
@@ -551,6 +569,7 @@ MEASUREMENTS = {
     "standings": Measurement(
         "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS), _standings
     ),
+    "learned": Measurement("python examples/data_set/baselines.py my_data learned.json", list),
     "credibility": Measurement("./fem page credibility", _credibility),
     "table_5_1": Measurement(
         "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
@@ -578,6 +597,7 @@ TABLES = {
     "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
     "standings_solvers": _standings_rows,
     "standings_parts": _standings_parts,
+    "learned_solvers": _learned_rows,
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
