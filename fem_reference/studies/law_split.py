@@ -1,5 +1,6 @@
 """Error of a solver with tetrahedra as a sum: what it left out, its law, its mesh, its convergence, by references in its law."""
 
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -8,7 +9,7 @@ import numpy as np
 
 from fem_reference.effects import Effect, make, moduli, name_of, regions_named
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import vertex_areas
+from fem_reference.foundations.mesh import diagonal, vertex_areas
 from fem_reference.metrics import rms
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
@@ -63,6 +64,7 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
     """References without what the solver leaves out; in its law; and so with linear tetrahedra."""
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
+    _check_held(bench)
     held = tuple(one.model_copy(update={"stiffness": None}) for one in case.attachment)
     whole = [one for one in case.effects if name_of(one) in LAW]
     own = [law] if moduli([law]).shear else [law, make("neo_hooke", mu=_WEAK * moduli([law]).bulk)]
@@ -80,6 +82,17 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
             got = f"a reference with {name_of(effects[0])} {element} that {made.outcome.status}: {made.outcome.message}"
             raise InputError(case.place, got, "one that reaches all frames")
         yield made
+
+
+def _check_held(bench: Bench[MuscleCase]) -> None:
+    """InputError where the muscle, held exactly as a solver holds it, would be free, or be held where it is not: without attachments,
+    and by springs whose stiffness times its size is below its shear modulus.
+    """
+    case, size = bench.scene, diagonal(bench.setup().surface.points)
+    soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
+    if soft or not case.attachment:
+        got = f"springs softer than the muscle: {', '.join(soft)}" if soft else "nothing"
+        raise InputError(f"{case.place}: attachment", got, "attachments that a solver can hold exactly")
 
 
 def _apart(one: Run, other: Run, i: int) -> float:
