@@ -85,8 +85,8 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
-    """InputError where the muscle, held exactly as a solver holds it, would be free, or be held where it is not: without
-    attachments, and by springs whose stiffness times its size is below its shear modulus.
+    """InputError where no solver can hold the muscle exactly: without attachments, and by springs whose stiffness times its size is
+    below its shear modulus.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
     soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
