@@ -22,6 +22,7 @@ from measurements import KEPT, MEASUREMENTS, TABLES, Measurement
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = TABLES | {
+    "cases": reference_pages.cases,
     "effect_parameters": reference_pages.parameters,
     "scene_keys": reference_pages.scenes,
     "file_keys": reference_pages.files,
