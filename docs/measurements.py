@@ -620,8 +620,7 @@ MEASUREMENTS = {
     "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
     "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
     "standings": Measurement(
-        f"./fem standings {' '.join(_STANDING)} --quick --set frames.last=200 --set frames.every=25 --time-limit '120 s' "
-        + " ".join(f"--program candidates/{name}" for name in _PROGRAMS),
+        "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS),
         _standings,
     ),
     "learned": Measurement("python examples/data_set/baselines.py my_data learned.json", list),
