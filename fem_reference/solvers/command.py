@@ -265,7 +265,8 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
         return Outcome(status, f"{why}{last}; {reached}", cost)
     if ended.code:
         how = f"signal {-ended.code}" if ended.code < 0 else f"exit status {ended.code}"
-        return Outcome("crashed", f"{how} after {took}{last}; {reached}", cost)
+        program = programs.found(shlex.split(settings.command)[0], settings.place)
+        return Outcome("crashed", f"{how} of {program} after {took}{last}; {reached}", cost)
     if trouble is not None:
         failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
         why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
