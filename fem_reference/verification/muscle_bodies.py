@@ -141,7 +141,7 @@ def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
-_FINER = "The second has twice the cells along each axis, and twice the load steps."
+_FINER = "The finer mesh is solved in twice the load steps."
 _OTHER_MU = (
     f"The abstract does not define mu. If the shear modulus is mu alpha / 2, {_MU.value * _ALPHA.value / 2:.0f} kPa, the ratio is "
     f"{_ALPHA.value / 2:.1f} times smaller."
