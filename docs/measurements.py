@@ -534,17 +534,17 @@ def _standings(found: dict[str, Any]) -> Any:
     return [{key: row[key] for key in kept_keys} | {"rms": row["worst"].get(_SURFACE)} for row in found["rows"]]
 
 
-def _standings_rows() -> str:
+def _standings_rows(file: str) -> str:
     """By solver its error on each case; in bold where it is no answer."""
-    rows = [row for row in kept("standings")["measured"] if row["rms"] is not None or _failed(row)]
+    rows = [row for row in kept(file)["measured"] if row["rms"] is not None or _failed(row)]
     cases = list(dict.fromkeys(row["case"] for row in rows))
     found = []
     for group, name in dict.fromkeys((row["group"], row["name"]) for row in rows):
         own = {row["case"]: row for row in rows if row["name"] == name}
-        times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"]]
+        times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"] and not _failed(row)]
         time = f"{1e3 * median(times):.3g} ms" if times else "-"
         found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
-    return table("standings", ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
+    return table(file, ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
 
 
 def _standing(row: dict[str, Any] | None) -> str:
@@ -576,15 +576,15 @@ def _learned_rows() -> str:
     return table("learned", ("kind", "solver", *counts.values()), found)
 
 
-def _standings_parts() -> str:
+def _standings_parts(file: str) -> str:
     """By program with a law of its own, the parts of its error on each case that could be split."""
-    rows = [row for row in kept("standings")["measured"] if row["split"]]
+    rows = [row for row in kept(file)["measured"] if row["split"]]
     names = list(dict.fromkeys(name for row in rows for name in row["split"]))
     found = [
         (f"`{row['name']}`", f"`{row['case']}`", f"{row['rms']:.3g}", *(f"{row['split'][name]:.2g}" for name in names))
         for row in rows
     ]
-    return table("standings", ("solver", "case", "error", *names), found)
+    return table(file, ("solver", "case", "error", *names), found)
 
 
 MEASUREMENTS = {
@@ -651,8 +651,8 @@ TABLES = {
     "credibility_arms": _credibility_arms,
     "arms_adduction": partial(_arms_about_rows, "arms_adduction"),
     "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
-    "standings_solvers": _standings_rows,
-    "standings_parts": _standings_parts,
+    "standings_solvers": partial(_standings_rows, "standings"),
+    "standings_parts": partial(_standings_parts, "standings"),
     "learned_solvers": _learned_rows,
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
