@@ -294,11 +294,5 @@ def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended)
     return found | {"seconds_per_frame": said.seconds_per_frame, "seconds_solve": seconds}
 
 
-SOLVES = (
-    CommandSolver(
-        settings=CommandSettings,
-        solve=solve,
-        require=require,
-        example={"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10},
-    ),
-)
+_EXAMPLE = {"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10}
+SOLVES = (CommandSolver(settings=CommandSettings, solve=solve, require=require, example=_EXAMPLE),)
