@@ -41,6 +41,8 @@ _STRIDE = 4
 # Random points around the surface at which the error is sampled, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
+# So many points are sampled at a time.
+_AT_ONCE = 10_000
 # Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
@@ -90,7 +92,7 @@ class Grid:
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
-        for chunk in np.array_split(inside, 1 + len(inside) // 10_000):
+        for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
             for whole, part in zip(found, self._interpolate(at[chunk]), strict=True):
                 whole[chunk] = part
         return found
