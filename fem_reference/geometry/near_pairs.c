@@ -221,11 +221,9 @@ static int fill(Grid *grid)
 
 void forget(Grid *grid)
 {
-    if (grid) {
-        free(grid->starts);
-        free(grid->inside);
-        free(grid->boxes);
-    }
+    free(grid->starts);
+    free(grid->inside);
+    free(grid->boxes);
     free(grid);
 }
 
@@ -233,22 +231,18 @@ void forget(Grid *grid)
 Grid *sorted(Surface surface)
 {
     Grid *grid = calloc(1, sizeof *grid);
-    if (grid) {
-        grid->count = surface.count;
-        grid->boxes = malloc((size_t)surface.count * sizeof *grid->boxes);
-    }
-    if (!grid || !grid->boxes) {
-        forget(grid);
+    if (!grid)
         return NULL;
-    }
-    for (int64_t t = 0; t < surface.count; t++)
+    grid->count = surface.count;
+    grid->boxes = malloc((size_t)surface.count * sizeof *grid->boxes);
+    for (int64_t t = 0; grid->boxes && t < surface.count; t++)
         grid->boxes[t] = box_of(&surface, t);
-    measure(grid);
-    if (!fill(grid)) {
-        forget(grid);
-        return NULL;
-    }
-    return grid;
+    if (grid->boxes)
+        measure(grid);
+    if (grid->boxes && fill(grid))
+        return grid;
+    forget(grid);
+    return NULL;
 }
 
 /* Add the pair s and t where it may meet; each once, in the cell of the greatest low corner of its boxes. */

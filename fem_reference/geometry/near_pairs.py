@@ -33,7 +33,8 @@ class _Sorted:
             raise MemoryError("pairs of triangles")
 
     def __del__(self) -> None:
-        self.code.forget(self.grid)
+        if self.grid:
+            self.code.forget(self.grid)
 
 
 # Bones are met at many frames, in a frame of their own.

@@ -172,7 +172,7 @@ def _bone_tips(bone: Surface) -> Ints:
 def _tips(triangles: bytes) -> Ints:
     """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
-    parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), corners.max() + 1)
+    parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
     found = np.zeros(parts.max() + 1, np.int64)
     found[parts[::-1]] = np.arange(len(parts))[::-1]  # the last to be set: the first of each
     return np.sort(found)
