@@ -22,6 +22,7 @@ from measurements import KEPT, MEASUREMENTS, TABLES, Measurement
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = TABLES | {
+    "cases": reference_pages.cases,
     "effect_parameters": reference_pages.parameters,
     "scene_keys": reference_pages.scenes,
     "file_keys": reference_pages.files,
@@ -63,6 +64,8 @@ def measure(name: str, folder: Path | None, commit: str) -> None:
 
 def _make(measurement: Measurement, path: Path) -> None:
     """Measure, and write the JSON of the verb to ``path``; that of several cases by their names, also where one has no solution."""
+    if not measurement.command.startswith("./fem "):
+        sys.exit(f"first {measurement.command}, and then --from its folder")
     found = {}
     for case in measurement.cases or ("",):
         words = shlex.split(measurement.command.replace("CASE", case))[1:]

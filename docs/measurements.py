@@ -33,6 +33,12 @@ _TURNED = (
     """'bone[2].motion.keyframes=[{{frame=0,angle="0rad"}},{{frame=30,angle="-0.3rad"}},{{frame=90,angle="0.3rad"}}]'"""
 )
 _PROGRAMS = ("newton_vbd", "mujoco_flex", "pbat_vbd", "pbat_xpbd", "pypbd_xpbd", "drake_fem")
+_STANDING = (
+    *("hip_flexion_tendon", "hip_flexion", "box_squeeze", "adductor_brevis", "gluteus_medius"),
+    *("iliacus_anatomical", "box_squeeze_report"),
+)
+_FAST_PROGRAMS = ("mujoco_flex",)
+_HARD = "at_rest bones degenerate fibres hip incompressible moved_away round_edge squeeze_bonded squeeze_sliding start twist"
 _TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
 
 
@@ -445,6 +451,49 @@ def _stress_solvers() -> str:
     return table("stress", ("solver", *VERDICTS), rows)
 
 
+def _hard_programs(found: dict[str, Any]) -> Any:
+    kept_keys = ("case", "solver", "verdict", "sentence", "quantity", "unit", "value", "bound")
+    return [{key: one.get(key) for key in kept_keys} for one in found["cells"]]
+
+
+def _hard_programs_rows() -> str:
+    """By case the verdict on each program, where one of them takes what acts."""
+    cells = kept("stress_programs")["measured"]
+    programs = list(dict.fromkeys(one["solver"] for one in cells))
+    taken = dict.fromkeys(one["case"] for one in cells if one["verdict"] != "not applicable")
+    by_place = {(one["case"], one["solver"]): _hard_verdict(one) for one in cells}
+    rows = [(f"`{case}`", *(by_place[case, name] for name in programs)) for case in taken]
+    return table("stress_programs", ("case", *(f"`{name}`" for name in programs)), rows)
+
+
+def _hard_verdict(one: dict[str, Any]) -> str:
+    if one["verdict"] == "not applicable":
+        return "-"
+    if one["verdict"] == "degraded":
+        return (
+            f"degraded: {one['quantity'].replace('_', ' ')} {one['value']:.2g} {one['unit']}, at most {one['bound']:g}"
+        )
+    return one["verdict"] if one["verdict"] == "ok" else f"{one['verdict']}: {one['sentence'].split(';')[0]}"
+
+
+def _hard_programs_left_out() -> str:
+    """By reason the cases that programs do not take."""
+    found = dict[str, dict[str, list[str]]]()
+    for one in kept("stress_programs")["measured"]:
+        if one["verdict"] == "not applicable":
+            found.setdefault(one["sentence"].partition(", want")[0], {}).setdefault(one["case"], []).append(
+                one["solver"]
+            )
+    rows = []
+    for reason, cases in found.items():
+        names = dict.fromkeys(name.partition(".")[0] for name in cases)
+        programs = dict.fromkeys(name for each in cases.values() for name in each)
+        rows.append(
+            (reason, len(cases), ", ".join(f"`{name}`" for name in names), ", ".join(f"`{name}`" for name in programs))
+        )
+    return table("stress_programs", ("not applicable, because", "cases", "of", "to"), rows)
+
+
 def _stress_steps() -> str:
     rows = []
     for one in kept("stress")["measured"]["ends"]:
@@ -487,13 +536,13 @@ def _cell(one: dict[str, Any] | None, name: str) -> str:
 
 
 def _standings(found: dict[str, Any]) -> Any:
-    kept_keys = ("case", "group", "name", "version", "status", "unsound", "seconds_per_frame", "split")
+    kept_keys = ("case", "group", "name", "version", "status", "unsound", "seconds_per_frame", "split", "time_limit")
     return [{key: row[key] for key in kept_keys} | {"rms": row["worst"].get(_SURFACE)} for row in found["rows"]]
 
 
 def _standings_rows() -> str:
     """By solver its error on each case; in bold where it is no answer."""
-    rows = [row for row in kept("standings")["measured"] if row["rms"] is not None]
+    rows = [row for row in kept("standings")["measured"] if row["rms"] is not None or _failed(row)]
     cases = list(dict.fromkeys(row["case"] for row in rows))
     found = []
     for group, name in dict.fromkeys((row["group"], row["name"]) for row in rows):
@@ -507,11 +556,30 @@ def _standings_rows() -> str:
 def _standing(row: dict[str, Any] | None) -> str:
     if row is None:
         return "-"
-    return (
-        f"**{row['unsound'].split(':')[0] or row['status']}**"
-        if row["unsound"] or row["status"] != "converged"
-        else f"{row['rms']:.3g}"
-    )
+    late = f"not within {row['time_limit']:g} s" if row["status"] == "timed out" else row["status"]
+    return f"**{row['unsound'].split(':')[0] or late}**" if _failed(row) else f"{row['rms']:.3g}"
+
+
+def _failed(row: dict[str, Any]) -> bool:
+    return bool(row["unsound"]) or row["status"] != "converged"
+
+
+def _learned_rows() -> str:
+    """By solver its mean distance on poses and on shapes that were not learned from."""
+    rows = kept("learned")["measured"]
+    counts = {row["split"]: f"{row['split']}s not seen, {row['muscles']} muscles" for row in rows}
+    found = []
+    for name in sorted(
+        {row["solver"] for row in rows}, key=lambda name: [row["error"] for row in rows if row["solver"] == name]
+    ):
+        own = {row["split"]: row for row in rows if row["solver"] == name}
+        lost = {split: f", {len(row['lost'])} not solved" for split, row in own.items() if row.get("lost")}
+        cells = [
+            f"{row['error']:.2f} mm, {number(row['seconds'] / row['muscles'], 2)} s{lost.get(split, '')}"
+            for split, row in own.items()
+        ]
+        found.append(("Learned" if own["pose"]["learned"] else "Not learned", f"`{name}`", *cells))
+    return table("learned", ("kind", "solver", *counts.values()), found)
 
 
 def _standings_parts() -> str:
@@ -552,6 +620,9 @@ MEASUREMENTS = {
         _fronts,
     ),
     "stress": Measurement("./fem stress --steps", _stress),
+    "stress_programs": Measurement(
+        f"./fem stress {_HARD} " + " ".join(f"--program candidates/{name}" for name in _FAST_PROGRAMS), _hard_programs
+    ),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "uncertainty_iliacus": Measurement(
         "./fem uncertainty iliacus_anatomical --set muscle.tet_size=7mm --set frames.last=100", _uncertainty
@@ -559,8 +630,10 @@ MEASUREMENTS = {
     "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
     "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
     "standings": Measurement(
-        "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS), _standings
+        "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS),
+        _standings,
     ),
+    "learned": Measurement("python examples/data_set/baselines.py my_data learned.json", list),
     "credibility": Measurement("./fem page credibility", _credibility),
     "table_5_1": Measurement(
         "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
@@ -579,6 +652,8 @@ TABLES = {
     "fibre_ends": _fibre_ends_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
+    "stress_programs_verdicts": _hard_programs_rows,
+    "stress_programs_left_out": _hard_programs_left_out,
     "uncertainty_bands": partial(_uncertainty_bands, "uncertainty"),
     "uncertainty_candidates": partial(_uncertainty_candidates, "uncertainty"),
     "uncertainty_iliacus_bands": partial(_uncertainty_bands, "uncertainty_iliacus"),
@@ -590,6 +665,7 @@ TABLES = {
     "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
     "standings_solvers": _standings_rows,
     "standings_parts": _standings_parts,
+    "learned_solvers": _learned_rows,
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),

@@ -4,7 +4,6 @@
 """
 
 import argparse
-import base64
 import inspect
 import json
 import re
@@ -26,10 +25,12 @@ from fem_reference.foundations.records import Record, keys
 from fem_reference.foundations.units import LENGTH_UNITS, length_unit, unit_of
 from fem_reference.problems import of_case
 from fem_reference.report import gallery as gallery_of_runs
+from fem_reference.report.embedded import picture_source
 from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers.command import Description
 from fem_reference.solvers.recorded import About
 from fem_reference.studies.hard.records import Hard
 
@@ -63,7 +64,13 @@ def effect_records() -> dict[str, list[type[Record]]]:
 
 def file_records() -> dict[str, list[type[Record]]]:
     """By the name of another file that people write or read its record and those inside, but those of scenes."""
-    files = {"candidate.toml": About, "a hard case": Hard, "a baseline": Baseline, "run.json": Contents}
+    files = {
+        "candidate.toml": About,
+        "candidate.toml of a program": Description,
+        "a hard case": Hard,
+        "a baseline": Baseline,
+        "run.json": Contents,
+    }
     known = scene_records()
     return {name: [one for one in dict.fromkeys(_and_below(top)) if one not in known] for name, top in files.items()}
 
@@ -118,8 +125,15 @@ def api() -> str:
     return "\n".join(_automatic(name) for name in fr.__all__)
 
 
+def cases() -> str:
+    """The shipped cases in one table."""
+    read = map(casefile.read, casefile.cases())
+    rows = "".join(f"| `{one.name}` | {_cell(one.title)} | {'yes' if one.needed_data else ''} |\n" for one in read)
+    return "| case | title | needs data |\n|---|---|---|\n" + rows
+
+
 def gallery() -> str:
-    """The shipped cases."""
+    """The shipped cases, one by one."""
     return "\n".join(_shown(casefile.read(name)) for name in casefile.cases())
 
 
@@ -225,7 +239,7 @@ def _pictures(case: Any) -> str:
         views = gallery_of_runs.draw(rest, rest.surface, [gallery_of_runs.Shot("rest", 0, rest.surface.points)])[0]
     except fr.MissingSoftware:
         return ""
-    kept = (f"data:image/webp;base64,{base64.b64encode(view).decode()}" for view in views)
+    kept = (picture_source(view) for view in views)
     return "".join(f'<img src="{one}" alt="{case.name} at rest" width="48%">\n' for one in kept) + "\n"
 
 

@@ -27,10 +27,10 @@ def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
             return
         rounding = ROUNDING * (float(np.abs(list(state.forces.values())).sum()) + float(np.abs(load).sum()))
         most, off = allowed + rounding, float(np.linalg.norm(_sum(state.forces) + load))
-        yield RunCheck("forces out of balance", off, most, "N", state.number)
+        yield RunCheck("residual force", off, most, "N", state.number)
         if not outer:
             arm, off = float(np.abs(state.points).max()), float(np.linalg.norm(_sum(state.moments)))
-            yield RunCheck("moments out of balance", off, most * arm, "N mm", state.number)
+            yield RunCheck("residual moment", off, most * arm, "N mm", state.number)
 
 
 def _sum(vectors: dict[str, Floats]) -> Floats:

@@ -215,7 +215,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     kinds = (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max())))
     for kind, unit, arm in kinds if own and math.isfinite(allowed) else ():
         for i, value in enumerate(() if outer else run.scalars.get(f"net_{kind}", ())):
-            yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, run.numbers[i])
+            yield RunCheck(f"residual {kind}", float(value), allowed * arm, unit, run.numbers[i])
         carriers = vector_names(run.scalars, f"{kind}_on_")  # bones, and muscles that may touch it
         carried = np.sum([getattr(run, kind)(name) for name in carriers], axis=0)
         for i, load in _loads(problem, run, kind) if outer and carriers else ():

@@ -24,7 +24,7 @@ class Standing(Record):
     reference is back at rest. ``unsound``: why its frames are no answer. ``split``: by part the root mean square [mm] of its error.
     ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
     ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
-    True where case, reference, solver or protocol changed since.
+    True where case, reference, solver or protocol changed since; ``time_limit``: the processor time [s] that it was given.
     """
 
     case: str
@@ -48,11 +48,18 @@ class Standing(Record):
     machine: str
     protocol: int
     stale: bool = False
+    time_limit: float | None = None
 
     @property
     def failed(self) -> bool:
         """True where it is not to be ranked."""
         return self.status != "converged" or bool(self.unsound)
+
+    @property
+    def ended(self) -> str:
+        """Its end in words: why its frames are no answer, the limit that it did not keep, or its status."""
+        late = self.status == "timed out" and self.time_limit is not None
+        return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
     def is_of(self, truth: str, run: str) -> bool:
         """True where it was measured by this protocol, on runs of these keys."""

@@ -8,6 +8,7 @@ from fem_reference.cli import DONE, SOLVER_FAILED, out
 from fem_reference.cli._cases import muscle_case, publish
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.units import positive
 from fem_reference.report import standings_page
 from fem_reference.report.asked import Asked
 from fem_reference.solvers import fenicsx
@@ -33,12 +34,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
     only = f"keep the rows of the last standings but those of these states: {','.join(STATES)}, and new ones"
     parser.add_argument("--only", default="", metavar="STATES", help=only)
+    limit = "processor time of a solver on a case, except of the reference; what takes more is never ranked (default: %(default)s)"
+    parser.add_argument("--time-limit", default=f"{standings.TIME_LIMIT:g} s", metavar="TIME", help=limit)
     parser.add_argument("--quick", action="store_true", help="cases at their sizes for quick solutions")
     share(parser, "--set", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure what is new or changed, and write the page."""
+    limit = _time(options.time_limit)
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:
         raise InputError("--only", f'"{options.only}"', f"some of {','.join(STATES)}")
@@ -50,7 +54,15 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--submission", "--quick or --set beside it", want)
     before = load(out(options) / f"{options.page_name or PAGE}.json")
     with fenicsx.shared():
-        found = standings.stand(cases, out(options) / "runs", entrants, before, only)
+        found = standings.stand(cases, out(options) / "runs", entrants, before, only, limit)
     page = standings_page.page(found)
     publish(options, Asked(PAGE, PAGE), page, page.numbers, standings_page.text(found))
     return SOLVER_FAILED if found.missing else DONE
+
+
+def _time(text: str) -> float:
+    """The time limit [s]."""
+    try:
+        return positive(text, "a time")
+    except ValueError as error:
+        raise InputError("--time-limit", f'"{text}"', str(error)) from error

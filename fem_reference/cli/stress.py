@@ -1,15 +1,18 @@
 """The verb ``stress``: every solver on hard cases, and whether it stays stable."""
 
 import argparse
+from collections.abc import Collection
+from pathlib import Path
 
 from fem_reference.assessment.stress import facts
 from fem_reference.cli import DONE
-from fem_reference.cli._cases import command_parts, own_solver, publish
+from fem_reference.cli._cases import check_names, command_parts, own_solver, publish
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.report.asked import Asked, Part
-from fem_reference.scenes.case import COMMAND
+from fem_reference.scenes.case import COMMAND, Candidate
+from fem_reference.studies import standings
 from fem_reference.studies.hard import records, running
 
 HELP = "run the hard cases with every solver, and write a page that shows which solvers stay stable"
@@ -21,6 +24,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
+    program = "a program in a folder, as in standings; these alone, where --solver names no others; may be repeated"
+    parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
     many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps: one end"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on N randomly perturbed meshes of each case as well"
@@ -37,11 +42,16 @@ def run(options: argparse.Namespace) -> int:
             want = f"--solver {records.REFERENCE} too, which alone it is about"
             raise InputError(name, f"it with {', '.join(options.solver)} alone", want)
     hard = records.read_all(tuple(options.names))
-    own = own_solver(options, list(records.choices()))
-    found = running.run(hard, options.solver, own, in_steps=options.steps, jitters=options.jitters)
+    commanded, programs = own_solver(options, list(records.choices())), [*map(standings.program, options.program)]
+    own = dict[Candidate, Collection[str] | None](dict.fromkeys(commanded))
+    own |= {one.candidate: one.takes if one.law else None for one in programs}
+    check_names([*records.choices(), *(one.name for one in own)])
+    only = options.solver or [COMMAND] * bool(programs)
+    found = running.run(hard, only, own, in_steps=options.steps, jitters=options.jitters)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--solver", name), name) for name in options.solver]
-    parts += command_parts(own)
+    parts += command_parts(commanded)
+    parts += [Part(("--program", str(folder)), folder.resolve().name) for folder in options.program]
     parts += [Part(("--steps",), "steps")] if options.steps else []
     parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
     asked = Asked("stress", "stress", tuple(parts))

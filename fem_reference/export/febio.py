@@ -34,7 +34,7 @@ from fem_reference.scenes.muscle import MuscleCase
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
 LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md compares
 # Newton's method stops at these shares of displacement and energy of the step's first correction: with a dtol of 1e-3
-# forces are 0.4 % out of balance.
+# the residual force is 0.4 %.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 

@@ -72,10 +72,10 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
     ones that it waited for if ``of_ended``; nothing where the system does not say.
     """
     parents, times = dict[int, int](), dict[int, float]()
-    for path in Path("/proc").glob("[0-9]*/stat"):
+    for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError, ValueError, IndexError):  # it may end meanwhile
-            fields = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
-            number = int(path.parent.name)
+            fields = (folder / "stat").read_bytes().rpartition(b")")[2].split()
+            number = int(folder.name)
             parents[number] = int(fields[1])
             times[number] = sum(map(int, fields[11 : 15 if of_ended else 13])) / os.sysconf("SC_CLK_TCK")
     found, size = {process} & set(times), 0

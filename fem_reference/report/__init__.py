@@ -4,7 +4,6 @@ Each kind of page is one module, whose ``page`` makes the record that :func:`wri
 """
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.report import comparison_page, field_page
 from fem_reference.report.pages import Page, write
 from fem_reference.report.tables import summary
 
@@ -14,5 +13,7 @@ __all__ = ["NAME", "Page", "of_comparison", "summary", "write"]
 
 def of_comparison(comparison: Comparison) -> Page:
     """The page of a comparison of any kind; its numbers are ``measures.json`` and ``measures.csv``."""
+    from fem_reference.report import comparison_page, field_page  # they load matplotlib, which most verbs do without
+
     of_field = "field" in comparison.reference.carries
     return field_page.comparison_page(comparison) if of_field else comparison_page.page(comparison)

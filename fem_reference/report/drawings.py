@@ -1,6 +1,5 @@
-"""Drawings inside a page: SVG whose text stays text and whose ids are unique, and pictures as WebP."""
+"""Drawings inside a page: SVG whose text stays text and whose ids are unique."""
 
-import base64
 import io
 import re
 from collections.abc import Callable, Iterable
@@ -15,7 +14,6 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from PIL import Image
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
@@ -205,15 +203,3 @@ def _named(colour: str) -> str:
     ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')
     """
     return f"var(--{_NAMED.get(colour, f'c-{colour[1:]}')}, {colour})"
-
-
-def webp(picture: Image.Image, quality: int) -> str:
-    """A picture as the text of ``src``, compressed with a ``quality`` of at most 100."""
-    stored = io.BytesIO()
-    picture.save(stored, "WEBP", quality=quality, method=4)
-    return picture_source(stored.getvalue())
-
-
-def picture_source(stored: bytes) -> str:
-    """A stored WebP picture as the text of ``src``."""
-    return f"data:image/webp;base64,{base64.b64encode(stored).decode()}"

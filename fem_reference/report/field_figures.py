@@ -20,7 +20,8 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
-from fem_reference.report.drawings import LOOK, Drawing, colour_of, drawn, positive, webp
+from fem_reference.report.drawings import LOOK, Drawing, colour_of, drawn, positive
+from fem_reference.report.embedded import webp
 from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"

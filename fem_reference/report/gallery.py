@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.local_fields import to_same_vertex
@@ -22,7 +20,7 @@ from fem_reference.foundations.subprocesses import command, environment, scratch
 from fem_reference.metrics import at_rest, find
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import pictures
-from fem_reference.report.drawings import picture_source
+from fem_reference.report.embedded import picture_source
 from fem_reference.runs.store import Run
 
 log = logging.getLogger(__name__)
@@ -107,6 +105,9 @@ def ticks(top: float) -> list[tuple[float, float]]:
 
 def ramp() -> str:
     """The colour map of the pictures as the stops of a CSS gradient."""
+    import matplotlib as mpl
+    from matplotlib.colors import to_hex
+
     return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))
 
 

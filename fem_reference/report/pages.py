@@ -23,7 +23,7 @@ from fem_reference.foundations.markup import exact
 from fem_reference.io import files
 from fem_reference.metrics import find
 from fem_reference.report import gallery
-from fem_reference.report.drawings import webp
+from fem_reference.report.embedded import webp
 from fem_reference.report.words import duration, listed, number, ratio, title_of, words
 
 # Where the facts stand in the frame of all pages (base.html), and where the command that made it.

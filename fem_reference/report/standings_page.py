@@ -1,5 +1,7 @@
 """The page ``standings``: solvers of all kinds over cases, one table on top, and a table of each case."""
 
+from collections.abc import Iterable
+
 from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
 from fem_reference.metrics import described
 from fem_reference.report.pages import Page
@@ -11,15 +13,23 @@ COLUMNS = tuple((".".join(key), one.label, one.full_unit) for key, one in _SHOWN
 def page(found: Standings) -> Page:
     """The page of standings."""
     longest = max((sum(row.split.values()) for row in found.rows), default=0.0)
+    limits = sorted({row.time_limit for row in found.rows if row.time_limit is not None})
     contents = {
+        "limits": [f"{limit:g} s" for limit in limits],
         "found": found,
-        "columns": COLUMNS,
+        "columns": {case: _columns(found.of(case)) for case in found.cases},
         "longest": longest or 1.0,
         "matched": (MATCHED_ERROR, MATCHED_TIME),
     }
     said = f"{len(found.rows)} results on {len(found.cases)} cases"
     numbers = found.model_dump(mode="json")
     return Page("standings", "Standings", (("", "", said),), "standings_page.html", contents, numbers)
+
+
+def _columns(rows: Iterable[Standing]) -> list[tuple[str, str, str]]:
+    """The columns of a case in which a row has a value: few solvers have forces."""
+    known = {name for row in rows for name, value in (*row.worst.items(), *row.bars.items()) if value is not None}
+    return [column for column in COLUMNS if column[0] in known]
 
 
 def text(found: Standings) -> str:
@@ -31,8 +41,7 @@ def text(found: Standings) -> str:
 
 def _line(row: Standing) -> str:
     value, bar = row.worst.get(ERROR), row.bars.get(ERROR)
-    ended = row.unsound or row.status
-    parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {ended}{' (stale)' if row.stale else ''}"]
+    parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {row.ended}{' (stale)' if row.stale else ''}"]
     parts += [] if value is None or row.failed else [f"surface rms {value:.3g} mm"]
     parts += [] if bar is None else [f"surface rms known to {bar:.2g} mm"]
     parts += [f"{name} {part:.3g} mm" for name, part in row.split.items()]

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 from fem_reference.assessment import stress
 from fem_reference.assessment.stress import VERDICTS, History, Scene, Stress
 from fem_reference.foundations.mesh import normals
-from fem_reference.report.drawings import webp
+from fem_reference.report.embedded import webp
 from fem_reference.report.pages import Page
 
 _MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "inconclusive": "?"}

@@ -36,6 +36,7 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
+REFUSED = 77  # the exit status of a program that does not take a scene, as that of a test that Automake skips
 # What a Python of its own executes: a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -243,8 +244,10 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
     """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
-    missing or damaged.
+    missing or damaged. InputError where it does not take the scene.
     """
+    if ended.code == REFUSED:
+        raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program takes")
     kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)

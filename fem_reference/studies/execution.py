@@ -1,6 +1,7 @@
 """The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
 
 import logging
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -39,9 +40,10 @@ log = logging.getLogger(__name__)
 class Bench[C: Case]:
     """A case with its set-up and its problem, each made once and only when it is needed, and the store of its runs."""
 
-    def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
+    def __init__(self, scene: C, store: Path, ranks: int | None = None, time_limit: float = math.inf) -> None:
         self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
         self._scene, self.store, self.ranks = of_case.chosen(scene, self._setup), store, ranks
+        self.time_limit = time_limit  # [s] of processor time that a candidate may take
         self._begin()
 
     def _begin(self) -> None:
@@ -227,7 +229,8 @@ class Bench[C: Case]:
             sofar = (given, wanted.settings, sink)
             return offer.go_on(*sofar, writer.cut_off) if offer.go_on and keeps else offer.solve(*sofar)
 
-        making.write(writer, solve, self._watched(solver))
+        limit = math.inf if wanted.choice == self.scene.reference else self.time_limit
+        making.write(writer, solve, self._watched(solver), limit)
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:

@@ -32,6 +32,10 @@ class StoppedError(Exception):
     """A run that has to continue with other effects; the reason."""
 
 
+class OvertimeError(Exception):
+    """A run that has taken the processor time that it may take; the reason."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """A run that is wanted: the ``name`` that pages give it, its solver and settings, and the ``folder`` that it is stored in."""
@@ -98,11 +102,17 @@ def _stop_for(found: Sequence[Decision]) -> None:
         raise StoppedError(f"{titles}, left out, turned out to matter at frame {found[0].turned_out}")
 
 
-def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None) -> None:
-    """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state."""
+def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None, time_limit: float = math.inf) -> None:
+    """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state. More
+    than ``time_limit`` [s] of processor time of this process ends it at the next frame.
+    """
 
     def add(frame: Frame) -> None:
         writer.add(frame)
+        if (used := time.process_time() - began) > time_limit:
+            raise OvertimeError(
+                f"ended at frame {frame.number:g} after {used:.3g} s of processor time, limit {time_limit:g} s"
+            )
         if watch is not None and frame.surface is not None:
             _stop_for(watch.see(frame.number, frame.surface, frame.points if len(frame.points) else None))
 
@@ -116,6 +126,8 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None)
             _stop_for(watch.end())
     except StoppedError as why:
         outcome = Outcome("stopped", str(why))
+    except OvertimeError as why:
+        outcome = Outcome("timed out", str(why))
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))

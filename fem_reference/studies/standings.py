@@ -3,7 +3,7 @@
 import hashlib
 import logging
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from fem_reference.io import texts
 from fem_reference.metrics import MeasurementContext, context_of, in_tables
 from fem_reference.runs.key import machine
 from fem_reference.runs.store import Run, complete
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import COMMAND, Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import command, recorded
 from fem_reference.studies import cost, law_split, refinement, table_5_1
@@ -28,8 +28,13 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own, which need nothing, and those of the report's anatomy.
-CASES = ("hip_flexion_tendon", *table_5_1.SCENARIOS)
+# Our own, which need nothing, and those of the report's anatomy, by what they cost.
+CASES = (
+    *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
+    *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
+)
+# The processor time [s] that a solver may take on a case.
+TIME_LIMIT = 600.0
 # The machine of frames that were submitted with their time.
 THEIRS = "as stated by its authors"
 # How far [mm] (rms) the reference may be from rest at the last frame for solvers to be asked how far they are.
@@ -57,6 +62,8 @@ def program(folder: Path) -> Entrant:
     """The program in a ``folder`` of that name, ``NAME/NAME.py``, with the settings of its ``candidate.toml`` as options."""
     file = folder / recorded.ABOUT
     said = parse(command.Description, texts.toml(file), str(file))
+    if said.law is not None:
+        law_split.check_law(said.law, said.settings.get("poisson"), str(file))
     options = " ".join(f"--{key} {{{key}}}" for key in said.settings)
     words = f"python {folder.resolve().name}.py {options} {{scene}} {{out}}"
     found = command.choice(words, folder.resolve(), str(file))
@@ -84,17 +91,20 @@ def stand(
     entrants: Sequence[Entrant],
     before: Sequence[Standing],
     only: Collection[str] = (),
+    time_limit: float = TIME_LIMIT,
 ) -> Standings:
-    """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``. Of the rows ``before``, those of
-    other cases are kept, and with ``only`` some states (``STATES``) those in no such state.
+    """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``; each may take ``time_limit`` [s]
+    of processor time on a case. Of the rows ``before``, those of other cases are kept, and with ``only`` some states
+    (``STATES``) those in no such state.
     """
     _check_names(entrants)
+    entrants = [_within(one, time_limit) for one in entrants]
     rows, missing, asked = list[Standing](), dict[str, str](), list[str]()
     for scene in scenes:
         asked.append(scene.name)
         known = {row.name: row for row in before if row.case == scene.name}
         try:
-            rows += _on(Bench(scene, store), entrants, known, only, missing)
+            rows += _on(Bench(scene, store, time_limit=time_limit), entrants, known, only, missing)
         except InputError as error:
             missing[scene.name] = str(error)
     for one in entrants:
@@ -103,6 +113,12 @@ def stand(
     done = {row.case for row in rows}
     rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
+
+
+def _within(one: Entrant, time_limit: float) -> Entrant:
+    """The entrant with the limit [s] where it is a program: for all alike, whatever it states itself."""
+    given = {"time_limit": f"{time_limit:g} s"} if one.candidate.solver == COMMAND else {}
+    return replace(one, candidate=one.candidate.model_copy(update=given))
 
 
 def _check_names(entrants: Sequence[Entrant]) -> None:
@@ -203,6 +219,7 @@ class _Measured:
             date=datetime.now(UTC).strftime("%Y-%m-%d"),
             machine=THEIRS if submitted else str(run.origin.get("machine", machine())),
             protocol=PROTOCOL,
+            time_limit=None if own or submitted else self.bench.time_limit,
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:

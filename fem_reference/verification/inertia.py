@@ -116,7 +116,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: inertia.fall(G, FALLING),
         within=1e-9,
         relative=True,
-        because="Steps in time are exact for a constant acceleration; forces are in balance to 1e-8 N of 1e-2 N in each step.",
+        because="Steps in time are exact for a constant acceleration; the residual force is 1e-8 N of 1e-2 N in each step.",
         source="validation/inertia.py, fall",
     ),
     MOVING(

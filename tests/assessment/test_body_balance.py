@@ -50,7 +50,7 @@ def lost(body: Body, run: Run) -> list[tuple[str, float]]:
 
 def test_dead_loads_are_what_the_constraints_carry() -> None:
     """2 x 3 mm2 under (0, 1, 2) kPa are (0, 6, 12) mN; 24 mm3 of 1e-9 t/mm3 at 1e4 mm/s2 weigh 0.24 mN."""
-    body, wrong = cube(LAW, DEAD, WEIGHT), [("forces out of balance", 1.0)]
+    body, wrong = cube(LAW, DEAD, WEIGHT), [("residual force", 1.0)]
     assert len(list(balance(body, recorded(body, foot=(0, 0, 0))))) == 1  # at rest nothing is solved
     carried = np.array([0.0, -0.006, -0.012 + 0.00024])
     assert lost(body, recorded(body, foot=carried)) == []
@@ -60,7 +60,7 @@ def test_dead_loads_are_what_the_constraints_carry() -> None:
     assert lost(body, recorded(body, foot=(np.nan, 0, 0))) == wrong
     # Twice the load, the root of 6^2 + 11.76^2 = 13.20 mN.
     denied = second_check.confirmed_body(body, replace(recorded(body, foot=-carried), body=body))
-    assert denied.outcome.message.startswith("denied by the second check: forces out of balance: 0.0264 N in frame 1")
+    assert denied.outcome.message.startswith("denied by the second check: residual force: 0.0264 N in frame 1")
 
 
 def test_moments_balance_where_no_load_acts() -> None:
@@ -68,7 +68,7 @@ def test_moments_balance_where_no_load_acts() -> None:
     run = recorded(body, foot=(1.0, 0, 0), head=(-1.0, 0, 0))
     assert lost(body, run) == []
     turned = replace(run.states[1], moments=run.states[1].moments | {"head": np.array([0, 5 * ALLOWED, 0])})
-    assert lost(body, replace(run, states=(run.states[0], turned))) == [("moments out of balance", 1.0)]
+    assert lost(body, replace(run, states=(run.states[0], turned))) == [("residual moment", 1.0)]
 
 
 def test_what_is_not_fully_known_is_not_judged() -> None:

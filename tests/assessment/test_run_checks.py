@@ -168,10 +168,10 @@ def test_forces_that_are_not_in_balance(tmp_path) -> None:
     assert lost(problem, run) == []
     for kind in ("force", "moment"):
         scalars = run.scalars | {f"net_{kind}": np.array([0.0, 0, 0, 1e-2, 0])}
-        assert lost(problem, replace(run, scalars=scalars)) == [f"{kind}s out of balance"]
+        assert lost(problem, replace(run, scalars=scalars)) == [f"residual {kind}"]
         # What is no number in one frame is not forgotten for what is well in the next.
         lost_number = run.scalars | {f"net_{kind}": np.array([0.0, np.nan, 0, 0, 0])}
-        assert lost(problem, replace(run, scalars=lost_number)) == [f"{kind}s out of balance"]
+        assert lost(problem, replace(run, scalars=lost_number)) == [f"residual {kind}"]
         ramp = [{"frame": 0.0, "amount": 1.0}, {"frame": 20.0, "amount": 1.0}]
         weighs = effects.make("gravity", density="1000 kg/m^3", acceleration="0, 0, -9.81 m/s^2", ramp=ramp)
         assert lost(replace(problem, effects=(*problem.effects, weighs)), replace(run, scalars=scalars)) == []

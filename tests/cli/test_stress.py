@@ -1,10 +1,19 @@
 """The verb ``stress``: its page, and runs that nobody would make."""
 
 import json
+import sys
+from pathlib import Path
 
 import pytest
 
 from fem_reference import cli
+
+PROGRAM = """
+import pathlib, shutil, sys
+scene, out = map(pathlib.Path, sys.argv[-2:])
+for frame in (0, 5, 10, 15, 20):
+    shutil.copy(scene / "muscle.ply", out / f"frame_{frame:04d}.ply")
+"""
 
 
 @pytest.mark.parametrize(
@@ -31,3 +40,21 @@ def test_the_verb_and_its_page(tmp_path, capsys) -> None:
     assert page.count('src="data:image/webp') == 2
     facts = json.loads((tmp_path / "facts.json").read_text())
     assert [entry["verdict"] for entry in facts["cells"]] == ["ok", "ok"]
+
+
+def test_a_program_of_somebody_else_is_judged_where_it_takes_what_acts(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
+    (tmp_path / "still").mkdir()
+    (tmp_path / "still" / "still.py").write_text(PROGRAM)
+    (tmp_path / "still" / "candidate.toml").write_text(
+        'name = "still"\nlaw = "stable_neo_hooke"\n[settings]\npoisson = 0.45\n'
+    )
+    names = ["at_rest.millimetres", "bones.crosses_in_a_frame"]
+    words = ["stress", *names, "--program", str(tmp_path / "still"), "--out", str(tmp_path)]
+    assert cli.main([*words, "--json", str(tmp_path / "found.json")]) == cli.DONE
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert [(one["solver"], one["verdict"]) for one in found["cells"]] == [
+        ("still", "ok"),
+        ("still", "not applicable"),
+    ]
+    assert "it leaves out what acts here: contact" in found["cells"][1]["sentence"]

@@ -1,7 +1,5 @@
 """Drawings inside a page: ids of their own, colours that a dark page may change, numbers as people read them."""
 
-import base64
-import io
 import itertools
 import re
 from pathlib import Path
@@ -10,7 +8,6 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from PIL import Image
 
 from fem_reference import solvers
 from fem_reference.report import drawings
@@ -109,13 +106,6 @@ def test_a_drawing_over_frames_has_its_unit_and_a_legend_whose_last_entry_is_wha
     texts = re.findall(r">([^<>]+)</text>", drawings.over_frames("v", "Volume", "mm3", curves).markup)
     assert {"frame", "mm³"} <= set(texts)
     assert texts.index("a run") < texts.index(drawings.NOT_A_NUMBER)
-
-
-def test_a_picture_is_what_stands_in_a_source() -> None:
-    source = drawings.webp(Image.new("RGB", (4, 3), "#ff0000"), 80)
-    kind, stored = source.split(",")
-    assert kind == "data:image/webp;base64"
-    assert Image.open(io.BytesIO(base64.b64decode(stored))).size == (4, 3)
 
 
 def test_a_logarithmic_axis_within_a_decade_has_numbers_and_a_longer_one_only_its_powers() -> None:

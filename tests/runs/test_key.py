@@ -1,5 +1,6 @@
 """Keys of runs: of the scene, the solver, its settings and the source files that it reaches."""
 
+import ast
 import shutil
 
 import numpy as np
@@ -41,6 +42,15 @@ def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> No
         for solver, own in reached.items():
             assert (hashed(solver) != before[solver]) == (name in own | both), (solver, name)
         (copy / name).write_bytes(text)
+
+
+def test_no_import_is_overlooked() -> None:
+    """Of any file of the package, beside all that its whole syntax tree has, wherever it stands in the file."""
+    for path in key.PACKAGE.rglob("*.py"):
+        nodes = [node for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, ast.ImportFrom)]
+        own = [node for node in nodes if node.level == 0 and f"{node.module}.".startswith("fem_reference.")]
+        names = {f"{node.module}.{alias.name}".removeprefix("fem_reference.") for node in own for alias in node.names}
+        assert names <= set(key.imported(path, key.PACKAGE)), path
 
 
 @pytest.mark.slow

@@ -6,11 +6,6 @@ from pathlib import Path
 from fem_reference.studies import dataset_loader
 
 
-def test_the_one_in_examples_is_the_same() -> None:
-    own = Path(dataset_loader.__file__)
-    assert (Path(__file__).parents[2] / "examples" / "data_set" / "load.py").read_bytes() == own.read_bytes()
-
-
 def test_it_is_short_and_needs_numpy_alone() -> None:
     text = Path(dataset_loader.__file__).read_text(encoding="utf-8")
     assert len([line for line in text.splitlines() if line.strip()]) <= 20

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.assessment.standings import ERROR
+from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.solvers import fenicsx
-from fem_reference.studies import standings, table_5_1
+from fem_reference.scenes.case import Candidate
+from fem_reference.solvers import fenicsx, pbd
+from fem_reference.studies import law_split, standings, table_5_1
 
 pytestmark = pytest.mark.slow
 
@@ -176,6 +179,31 @@ def test_a_program_states_its_group_and_law() -> None:
 
 
 @pytest.mark.usefixtures("place")
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (
+            'law = "corotated"',
+            'still/candidate.toml: law: got "corotated", want squared_invariants, st_venant_kirchhoff',
+        ),
+        ('law = "contact"', 'law: got "contact", want squared_invariants'),
+        ('law = "stable_neo_hooke"', "candidate.toml: settings.poisson: got nothing, want the Poisson's ratio"),
+    ],
+)
+def test_a_law_that_cannot_be_split_is_refused_before_anything_is_solved(law, message, capsys) -> None:
+    about = Path("still/candidate.toml")
+    about.write_text(f"{law}\n{about.read_text()}")
+    assert cli.main(["standings", "./bar", "--program", "still"]) == cli.BAD_INPUT
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("poisson", [0.5, 0.0, -0.1, float("nan"), "0.45", True])
+def test_a_poisson_ratio_has_no_value_beyond_its_range(poisson) -> None:
+    with pytest.raises(InputError, match=r"settings\.poisson"):
+        law_split.check_law("stable_neo_hooke", poisson, "candidate.toml")
+
+
+@pytest.mark.usefixtures("place")
 def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> None:
     stand("--program", "still")
 
@@ -193,3 +221,30 @@ def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> Non
 def test_bad_states_are_named(capsys) -> None:
     assert cli.main(["standings", "./bar", "--only", "old"]) == cli.BAD_INPUT
     assert '--only: got "old", want some of failed,stale' in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("place")
+def test_a_solver_over_the_time_limit_is_named_and_not_ranked(monkeypatch) -> None:
+    def slow(setup, _, sink) -> Outcome:
+        begin = time.process_time()
+        for number in setup.frames:
+            sink(Frame(number, setup.surface.points))
+            while time.process_time() < begin + 0.4:
+                pass
+        return Outcome("converged", "done")
+
+    stand_ins.solve_by(monkeypatch, pbd, slow)
+    ours = Candidate(name="ours", solver="pbd", **pbd.SOLVES[0].example)
+    monkeypatch.setattr(table_5_1.solvers, "in_table", lambda kind=None: (ours,) if kind == "PBD" else ())
+    Path("still/still.py").write_text(PROGRAM + "while True: pass\n")
+    rows = {row["name"]: row for row in stand("--program", "still", "--time-limit", "0.3 s")["rows"]}
+    assert rows["reference"]["time_limit"] is None
+    assert (rows["reference"]["status"], rows["ours"]["status"], rows["still"]["status"]) == (
+        "converged",
+        *2 * ["timed out"],
+    )
+    assert rows["ours"]["least_error"] is rows["still"]["least_error"] is None
+    assert "processor time" in rows["ours"]["message"]
+    page = Path("reports/standings.html").read_text()
+    assert page.count("not within 0.3 s: ") == 2
+    assert "Each solver may take 0.3 s of processor time" in page

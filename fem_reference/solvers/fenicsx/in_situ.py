@@ -19,8 +19,8 @@ _SHARE = 1e-2  # of the residual of Newton's method, which remains at most
 
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
-    """Find the stress at rest of a ``form``, if it has one, until no more than a small share of the ``residual`` of Newton's method
-    is out of balance. ArithmeticError where none is found.
+    """Find the stress at rest of a ``form``, if it has one, until a small share of the ``residual`` of Newton's method is left.
+    ArithmeticError where none is found.
     """
     if form.rest is None:
         return

@@ -137,11 +137,11 @@ class Process:
             watching.join()  # if it has begun to end the process, that is over after this
 
     def _watch(self, time_limit: float, done: threading.Event) -> None:
-        begin, before = time.monotonic(), processor_times(self.process.pid)
+        begin = time.monotonic()
+        now = before = processor_times(self.process.pid)
         longest = CLOCK * (_START + time_limit)
         while self.overran is None:
             passed = time.monotonic() - begin
-            now = processor_times(self.process.pid) if before else {0: passed}
             used = max((seconds - before.get(number, 0.0) for number, seconds in now.items()), default=0.0)
             if used >= time_limit:
                 self.overran = "timed out", f"stopped after {time_limit:g} s of processor time, the time limit"
@@ -153,6 +153,7 @@ class Process:
                 self.overran = "stalled", why
             elif done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):
                 return
+            now = processor_times(self.process.pid) if before else {0: time.monotonic() - begin}
         self._stop()
 
     def _stop(self) -> None:

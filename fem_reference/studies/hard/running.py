@@ -5,7 +5,7 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,6 +16,7 @@ from fem_reference import solvers
 from fem_reference.assessment import health, stress
 from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress, Verdict
+from fem_reference.effects import name_of
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import MachineTime, spent_since
@@ -29,6 +30,7 @@ from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, following
 from fem_reference.studies.hard.following import SameEnd, StalledError, follow
 from fem_reference.studies.hard.records import LIMIT, REFERENCE, SECOND, Hard, choices
+from fem_reference.studies.law_split import LAW
 
 log = logging.getLogger(__name__)
 
@@ -68,31 +70,35 @@ class Posed:
 def run(
     hard: Sequence[Hard],
     only: Sequence[str] = (),
-    own: Sequence[Candidate] = (),
+    own: Mapping[Candidate, Collection[str] | None] | None = None,
     *,
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
     """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
-    so many ``jitters``.
+    so many ``jitters``. Of one's own: the effects that it takes beside those of a law of the whole muscle, None where not known.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     limit = {"time_limit": f"{LIMIT:g} s"}
+    own = own or {}
     chosen |= {one.name: SolverChoice(**{"solver": one.solver, **limit, **one.settings}) for one in own}
+    takes = {one.name: effects for one, effects in own.items()}
     with fenicsx.shared():
         for i, one in enumerate(hard):
             posed, place = Posed(one, in_steps=in_steps, jitters=jitters), f"case {i + 1} of {len(hard)}: {one.name}"
             for name, choice in chosen.items():
-                found = replace(cell(posed, one.choice(choice)), solver=name)
+                found = replace(cell(posed, one.choice(choice), takes.get(name)), solver=name)
                 log.info("%s, %s: %s: %s", place, name, found.verdict, found.sentence)
                 cells.append(found)
     rows = tuple(HardCase(one.name, one.title, one.healthy, one.bound) for one in hard)
     return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with() | spent_since(clock))
 
 
-def cell(posed: Posed, choice: SolverChoice) -> Cell:
-    """The cell of a case by a solver: never an exception."""
+def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
+    """The cell of a case by a solver: never an exception. Not applicable where it leaves out an effect: it ``takes`` all that it
+    can beside a law, or is not known to leave out any.
+    """
     begin = time.perf_counter()
     hard, solver = posed.hard, choice.solver
     try:
@@ -102,6 +108,10 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
             )
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "not applicable", "nothing but effects acts, and this solver simulates none")
+        if takes is not None and posed.problem.muscle is not None:
+            acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
+            if lacks := [name for name in acting if name not in (*LAW, *takes)]:
+                return Cell(hard.name, solver, "not applicable", f"it leaves out what acts here: {', '.join(lacks)}")
         with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:

@@ -96,4 +96,4 @@ def test_viscosity_is_within_the_body() -> None:
     problem = replace(bar(), effects=(*FLESH, effects.make("viscosity", eta="300 kPa s")))
     checks = {one.name: one for one in of_muscle(problem, solved(problem))}
     for kind in ("force", "moment"):
-        assert checks[f"{kind}s out of balance"].met
+        assert checks[f"residual {kind}"].met

@@ -29,6 +29,18 @@ def test_at_rest_stays_at_rest(solver) -> None:
     assert found.verdict == ("not applicable" if solver == "line_of_action" else "ok")
 
 
+def test_a_solver_that_leaves_out_what_acts_is_no_success() -> None:
+    """A bone that nobody feels leaves the block at rest, which would be healthy."""
+    choice = records.choices()["pbd"]
+    for name, takes, lacks in (
+        ("bones.crosses_in_a_frame", (), "contact"),
+        ("round_edge.tendon", ("contact",), "fibre_passive"),
+    ):
+        found = running.cell(running.Posed(CASES[name]), choice, takes)
+        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out what acts here: {lacks}")
+    assert running.cell(running.Posed(CASES["at_rest.millimetres"]), choice, ()).verdict == "ok"
+
+
 @pytest.mark.slow
 def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
     for name in ("at_rest.millimetres", "at_rest.metres", "at_rest.kilometre_away"):
