@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy.interpolate import BPoly, CubicHermiteSpline, RBFInterpolator, interp1d
+import scipy
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
@@ -31,20 +31,20 @@ def knots(points: Floats, exponent: float = 1.0) -> Floats:
 
 def constant(points: Floats) -> Curve:
     """The nearest of ``points`` (n, d) by chord length (report 3.1)."""
-    found: Curve = interp1d(knots(points), points, kind="nearest", axis=0)
+    found: Curve = scipy.interpolate.interp1d(knots(points), points, kind="nearest", axis=0)
     return found
 
 
 def linear(points: Floats) -> Curve:
     """Straight between ``points`` (n, d) (report 3.1)."""
-    found: Curve = interp1d(knots(points), points, axis=0)
+    found: Curve = scipy.interpolate.interp1d(knots(points), points, axis=0)
     return found
 
 
 def bezier(points: Floats) -> Curve:
     """The Bezier curve of degree n - 1 whose control points are ``points`` (n, d); it passes the first and the last (3.1)."""
     knots(points)
-    found: Curve = BPoly(points[:, None], [0.0, 1.0])
+    found: Curve = scipy.interpolate.BPoly(points[:, None], [0.0, 1.0])
     return found
 
 
@@ -58,7 +58,9 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
     slopes = np.diff(points, axis=0) / np.diff(times)[:, None]
     wide = (times[2:] - times[:-2])[:, None]
     inner = slopes[:-1] + slopes[1:] - (points[2:] - points[:-2]) / wide
-    found: Curve = CubicHermiteSpline(times, points, np.concatenate([slopes[:1] / 2, inner, slopes[-1:] / 2]))
+    found: Curve = scipy.interpolate.CubicHermiteSpline(
+        times, points, np.concatenate([slopes[:1] / 2, inner, slopes[-1:] / 2])
+    )
     return found
 
 
@@ -80,7 +82,7 @@ def radial(points: Floats, shape: float = 3.0) -> Curve:
     ``shape``: over the length of the curve, the inverse width of a Gaussian.
     """
     times = knots(points)
-    found = RBFInterpolator(times[:, None], points, kernel="gaussian", epsilon=shape, degree=1)
+    found = scipy.interpolate.RBFInterpolator(times[:, None], points, kernel="gaussian", epsilon=shape, degree=1)
     return lambda t: np.asarray(found(np.asarray(t, dtype=float)[:, None]))
 
 

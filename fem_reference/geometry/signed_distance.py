@@ -12,7 +12,7 @@ from typing import Any
 
 import igl
 import numpy as np
-from scipy.ndimage import gaussian_filter, spline_filter, zoom
+import scipy
 
 from fem_reference.foundations.mesh import (
     Floats,
@@ -134,7 +134,7 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
     if rounding > 0:
-        values = gaussian_filter(values, rounding / spacing, mode="nearest")
+        values = scipy.ndimage.gaussian_filter(values, rounding / spacing, mode="nearest")
     grid = Grid(_coefficients(values), tuple((low - spacing).tolist()), spacing, margin, np.nan, np.nan)
     largest, mean = _errors(grid, surface)
     return replace(grid, error=largest, mean_error=mean)
@@ -196,7 +196,7 @@ def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: fl
     coarse_points = low + np.moveaxis(np.indices(coarse_shape), 0, -1).reshape(-1, 3) * (_STRIDE * spacing)
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
     stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
-    values: Floats = zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
+    values: Floats = scipy.ndimage.zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
     # The error of trilinear values is at most half the diagonal of a coarse cell: a distance changes no faster than its point.
     near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
     values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
@@ -210,7 +210,7 @@ def _coefficients(values: Floats) -> Floats:
     """
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
-    return np.asarray(spline_filter(beyond, order=3)[keep, keep, keep])
+    return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])
 
 
 def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from fem_reference.effects import Effect, State, moduli, total_energy
 from fem_reference.foundations.errors import InputError
@@ -66,7 +66,7 @@ def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: F
         cauchy = nominal_stress(acting, F, fibre) @ F.T
         return np.append(np.diag(cauchy)[free], cauchy[0, 1])
 
-    found = root(left, start, options={"xtol": 1e-14}).x
+    found = scipy.optimize.root(left, start, options={"xtol": 1e-14}).x
     F = gradient(found)
     P = nominal_stress(acting, F, fibre)
     if not np.abs(left(found)).max() <= _LEFT * np.abs(P).max() + _ROUNDING * moduli(acting).bulk:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fem_reference.effects import Effect, make, moduli, name_of, regions_named
+from fem_reference.effects import Effect, Energy, find, make, moduli, name_of, names, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import diagonal, vertex_areas
 from fem_reference.metrics import rms
@@ -104,3 +104,17 @@ def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
     """The effect ``name`` with the parameters of the matrix of a ``case``."""
     mu, second = lame(case, poisson)
     return make(name, mu=mu, lame=second)
+
+
+def check_law(name: str, poisson: object, place: str) -> None:
+    """InputError, which names the ``place`` of a solver's keys, where the reference has no such law with Lame's parameters, or
+    ``poisson`` is no Poisson's ratio.
+    """
+    known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
+    if name not in known:
+        raise InputError(
+            f"{place}: law", f'"{name}"', f"{', '.join(known)}, or no key law: then the error is not split"
+        )
+    if not isinstance(poisson, float) or not 0 < poisson < 0.5:
+        got = "nothing" if poisson is None else str(poisson)
+        raise InputError(f"{place}: settings.poisson", got, "the Poisson's ratio between 0 and 0.5 that goes with law")

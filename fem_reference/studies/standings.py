@@ -62,6 +62,8 @@ def program(folder: Path) -> Entrant:
     """The program in a ``folder`` of that name, ``NAME/NAME.py``, with the settings of its ``candidate.toml`` as options."""
     file = folder / recorded.ABOUT
     said = parse(command.Description, texts.toml(file), str(file))
+    if said.law is not None:
+        law_split.check_law(said.law, said.settings.get("poisson"), str(file))
     options = " ".join(f"--{key} {{{key}}}" for key in said.settings)
     words = f"python {folder.resolve().name}.py {options} {{scene}} {{out}}"
     found = command.choice(words, folder.resolve(), str(file))
