@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
@@ -116,9 +116,14 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def _in_box(body: Surface, points: Floats) -> Ints:
-    """The ``points`` (k,) of n within the box around a ``body``."""
-    low, high = boxes_of(body).hull
+    """The ``points`` (k,) of n within the box around the points of a ``body``."""
+    low, high = _box(body)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+
+
+@lru_cache(maxsize=4)
+def _box(body: Surface) -> tuple[Floats, Floats]:
+    return body.points.min(axis=0), body.points.max(axis=0)
 
 
 def _of_surface(
@@ -166,8 +171,11 @@ def _bone_tips(bone: Surface) -> Ints:
 @lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
     """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
-    parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
-    return np.unique(parts, return_index=True)[1]
+    corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
+    parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
+    found = np.zeros(parts.max() + 1, np.int64)
+    found[parts[::-1]] = np.arange(len(parts))[::-1]  # the last to be set: the first of each
+    return np.sort(found)
 
 
 class Shared(NamedTuple):

@@ -43,6 +43,8 @@ _STRIDE = 4
 # Random points around the surface at which the error is sampled, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
+# So many points are sampled at a time.
+_AT_ONCE = 10_000
 # Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
@@ -106,7 +108,7 @@ class Grid:
         """Which of the ``points`` (n, 3) are inside the grid, in chunks, and where, in cells from its origin."""
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
-        for chunk in np.array_split(inside, 1 + len(inside) // 10_000):
+        for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
             yield chunk, at[chunk]
 
     def _values(self, at: Floats, orders: int) -> Floats:

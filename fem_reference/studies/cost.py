@@ -156,10 +156,9 @@ def costs(run: Run) -> dict[str, float]:
     """Costs of a run: those of ``COSTS`` that are known, and seconds by phase."""
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
-    found = {} if seconds is None else {"seconds_per_frame": seconds}
-    return found | {
-        name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")
-    }
+    found = {name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")}
+    # A time that a program states is of a frame number: one frame that is wanted may be many of these.
+    return found | ({} if seconds is None else {"seconds_per_frame": seconds})
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
