@@ -88,7 +88,7 @@ def test_a_setting_that_is_its_solvers_own_is_no_setting(tmp_path) -> None:
 
 
 def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f'--out: got "{tmp_path}", where no study is'):
+    with pytest.raises(InputError, match=f'--out: got "{tmp_path}", which has no study'):
         cost.stored(tmp_path)
     (tmp_path / "study").mkdir()
     path = tmp_path / "study" / "study.json"
