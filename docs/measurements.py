@@ -33,7 +33,7 @@ _TURNED = (
     """'bone[2].motion.keyframes=[{{frame=0,angle="0rad"}},{{frame=30,angle="-0.3rad"}},{{frame=90,angle="0.3rad"}}]'"""
 )
 _PROGRAMS = ("newton_vbd", "mujoco_flex", "pbat_vbd", "pbat_xpbd", "pypbd_xpbd", "drake_fem")
-_STANDING = ("hip_flexion_tendon", "hip_flexion", "box_squeeze", "adductor_brevis")
+_STANDING = ("hip_flexion_tendon", "hip_flexion", "box_squeeze", "adductor_brevis", "gluteus_medius")
 _DRAWN = " ".join(f"my_data/scenes/muscle_{number}" for number in ("0001", "0004", "0005"))
 _LIMITED = "--time-limit '120 s' " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS)
 _FAST_PROGRAMS = ("mujoco_flex",)

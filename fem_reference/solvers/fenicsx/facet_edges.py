@@ -45,7 +45,7 @@ class FacetEdges:
         if len(asked):
             on, inner = self.nearest(nodes, pairs[0][asked], pairs[1][asked])
             changed[asked[inner]] = True
-            there = there.replaced(asked[inner], on[inner])
+            there = there.replaced(asked[inner], on[np.flatnonzero(inner)])
         return there, changed
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> tuple[FacetPlaces, NDArray[np.bool_]]:
