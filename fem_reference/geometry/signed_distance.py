@@ -105,7 +105,7 @@ class Grid:
         return found
 
     def _inside(self, points: Floats) -> Iterator[tuple[Ints, Floats]]:
-        """Which of the ``points`` (n, 3) are inside the grid, in chunks, and where, in cells from its origin."""
+        """Chunks of the indices of ``points`` (n, 3) inside the grid, with their places in cells from its origin."""
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
         for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
