@@ -158,7 +158,7 @@ def of_result(found: Result) -> Beside:
     coarser = [f"Cells of {size:.3g} mm give {value:.4g}." for size, value in found.finding.ladder[:-1]]
     return Beside(
         *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
-        remark=" ".join([*coarser, found.finding.note]).strip(),
+        remark=" ".join([*coarser, *filter(None, [found.finding.note]), f"Beside: {entry.source}."]),
         is_order=entry.is_order,
     )
 

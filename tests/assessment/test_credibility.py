@@ -138,12 +138,12 @@ def test_nine_tenths_of_the_poses_are_not_all() -> None:
     assert (one.value, one.truth, one.met) == (pytest.approx(90), 100, False)
 
 
-def test_a_remark_has_the_values_of_coarser_meshes() -> None:
+def test_a_remark_has_the_values_of_coarser_meshes_and_the_source() -> None:
     one = replace(
         measured(1.02), finding=Finding(1.02, ladder=((2.0, 1.04), (1.0, 1.02)), note="Twice the load steps.")
     )
-    assert of_result(one).remark == "Cells of 2 mm give 1.04. Twice the load steps."
-    assert of_result(measured(1.02)).remark == ""
+    assert of_result(one).remark == "Cells of 2 mm give 1.04. Twice the load steps. Beside: by hand."
+    assert of_result(measured(1.02)).remark == "Beside: by hand."
 
 
 def test_a_remark_counts_the_poses_in_which_the_published_arm_is_known() -> None:
