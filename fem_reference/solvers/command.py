@@ -128,9 +128,7 @@ def choice(command: str, directory: Path, place: str) -> Candidate:
     file = next((path for path in places if path.exists()), places[-1])
     said = parse(Description, texts.toml(file), str(file)) if file.exists() else Description()
     if said.seconds_per_frame is not None or said.threads is not None:
-        want = (
-            f"neither here: time is measured, or stated by a {recorded.ABOUT} that the command writes into its folder"
-        )
+        want = f"neither here: time is measured, or stated by a {recorded.ABOUT} that the command writes"
         raise InputError(file, "seconds_per_frame or threads", want)
     for key in [*said.settings, *said.ladder]:
         _check_named(key, names, f"{file}: {'settings' if key in said.settings else 'ladder'}")
@@ -243,9 +241,7 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
-    missing or damaged. InputError where it does not take the scene.
-    """
+    """The outcome of a program that ``ended``, and its frames up to the first missing or damaged one; InputError if it refused."""
     if ended.code == REFUSED:
         raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program takes")
     kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
