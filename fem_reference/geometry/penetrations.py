@@ -185,7 +185,7 @@ class Shared(NamedTuple):
     deepest: float
 
 
-def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body: Floats) -> Shared:
+def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
@@ -193,13 +193,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body
     times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
-    [mm] of points (n, 3) to it, negative inside, and by points ``body`` (k, 3) [mm] on all its sides: where all are inside the
-    surface, the whole body counts. The volume is 0 where no counted triangle enters the body, and the body does not reach into
-    the surface up to its middle. It is NaN where the surface has blown up beyond a cubic metre.
+    [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
+    [mm] on all its sides: where all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
+    enters the body, and the body does not reach into the surface up to its middle. It is NaN where the surface has blown up
+    beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
-    if extent.max() == 0 or not (within.any() or _touches(surface, counts, distance)):
+    if extent.max() == 0 or not (within.any() or _touches(surface, counts, gaps, distance)):
         return Shared(0.0, 0.0)
     if np.prod(extent / _FIRST_EDGE) > _TOO_MANY:
         return Shared(np.nan, 0.0)
@@ -227,10 +228,10 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
     return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
-def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
+def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
     """True where a counted triangle enters the body; tested at its vertices, and near the body at ever smaller parts."""
     triangles = surface.triangles[counts]
-    corners, away = surface.points[triangles], distance(surface.points)[triangles]
+    corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True

@@ -46,7 +46,9 @@ def test_a_program_of_somebody_else_is_judged_where_it_takes_what_acts(tmp_path,
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
     (tmp_path / "still").mkdir()
     (tmp_path / "still" / "still.py").write_text(PROGRAM)
-    (tmp_path / "still" / "candidate.toml").write_text('name = "still"\nlaw = "stable_neo_hooke"\n[settings]\npoisson = 0.45\n')
+    (tmp_path / "still" / "candidate.toml").write_text(
+        'name = "still"\nlaw = "stable_neo_hooke"\n[settings]\npoisson = 0.45\n'
+    )
     names = ["at_rest.millimetres", "bones.crosses_in_a_frame"]
     words = ["stress", *names, "--program", str(tmp_path / "still"), "--out", str(tmp_path)]
     assert cli.main([*words, "--json", str(tmp_path / "found.json")]) == cli.DONE
