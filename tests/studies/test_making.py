@@ -80,7 +80,7 @@ def test_a_run_over_its_time_ends_with_the_frames_that_it_reached(tmp_path: Path
             sink(Frame(number, surface.points))
         return Outcome("converged", "")
 
-    for limit, status, reached in ((0.25, "timed out", 2), (10.0, "converged", 3)):
+    for limit, status, reached in ((10.0, "converged", 3), (0.25, "timed out", 2)):
         identity = {"name": "one", "solver": "test", "frames": (0, 1, 2), "origin": {}}
         writer = Writer(tmp_path / status.split()[0], identity, AtRest(surface))
         making.write(writer, solve, None, limit)
