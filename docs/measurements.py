@@ -15,7 +15,7 @@ from fem_reference.assessment.catalogue import Entry
 from fem_reference.assessment.recommendation import TIME
 from fem_reference.assessment.stress import VERDICTS
 from fem_reference.foundations.records import parse
-from fem_reference.verification import runner
+from fem_reference.verification import muscle_bodies, runner
 
 KEPT = Path(__file__).parent / "measured"
 _SURFACE, _TIME = "surface_deviation.rms", "seconds_processor"
@@ -76,6 +76,20 @@ def number(value: float | None, digits: int = 3) -> str:
 def _verify(found: dict[str, Any]) -> Any:
     keys = ("group", "name", "kind", "verdict", "value", "truth", "error", "within", "unit")
     return [{key: one[key] for key in keys} for one in found["entries"]]
+
+
+def _bodies(found: dict[str, Any]) -> Any:
+    return [one | {"ladder": each["ladder"]} for one, each in zip(_verify(found), found["entries"], strict=True)]
+
+
+def _bodies_rows() -> str:
+    """By entry the value, that of the coarser mesh with half the load steps, and the measured one."""
+    rows = []
+    for one in kept("bodies")["measured"]:
+        title = next(each.title for each in muscle_bodies.ENTRIES if each.name == one["name"])
+        measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
+        rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, one["verdict"]))
+    return table("bodies", ("", "shipped material", "on cells twice as large, in half the steps", "measured", ""), rows)
 
 
 def _verify_groups() -> str:
@@ -594,6 +608,7 @@ def _standings_parts(file: str) -> str:
 
 MEASUREMENTS = {
     "verify": Measurement("./fem verify", _verify),
+    "bodies": Measurement("./fem verify vastus_stretch indentation_tenth indentation_fifth", _bodies),
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "collagen": Measurement(
@@ -644,6 +659,7 @@ MEASUREMENTS = {
 TABLES = {
     "verify_groups": _verify_groups,
     "hip_flexion_worst": _comparison_worst,
+    "bodies": _bodies_rows,
     "hip_flexion_reference": _reference,
     "effects_hip_flexion": _omission_rows,
     "collagen": _collagen_rows,
