@@ -45,8 +45,20 @@ class FacetEdges:
         if len(asked):
             on, inner = self.nearest(nodes, pairs[0][asked], pairs[1][asked])
             changed[asked[inner]] = True
-            there = there.replaced(asked[inner], on[inner])
+            there = there.replaced(asked[inner], on[np.flatnonzero(inner)])
         return there, changed
+
+    def before(self, nodes: Floats, points: Floats, depths: Floats) -> NDArray[np.bool_]:
+        """True (n,) where ``points`` (n, 3) [mm] are in front of a facet at less than the ``depths`` (n,) [mm] at which they are
+        behind others: outside, then.
+        """
+        middles, radii = self.facets.balls(nodes)
+        found = np.zeros(len(points), bool)
+        some, facets = np.nonzero(np.linalg.norm(points[:, None] - middles, axis=2) < radii + depths[:, None])
+        there = self.facets.nearest(nodes, facets, points[some])
+        gap = np.vecdot(points[some] - there.point, there.normal)
+        found[some[(gap > 0) & (gap < depths[some]) & (self.facets.beyond(there.at) <= 0)]] = True
+        return found
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> tuple[FacetPlaces, NDArray[np.bool_]]:
         """The places on the edges of the facets ``which`` (n,) that are nearest to ``points`` (n, 3) [mm]; and True (n,) where the
