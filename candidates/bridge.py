@@ -15,7 +15,7 @@ import tomllib
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import meshio
 import numpy as np
@@ -104,14 +104,20 @@ class Solver(Protocol):
         """Positions of all vertices (n, 3) [m]."""
 
 
+def refuse(why: str) -> NoReturn:
+    """End with a sentence and the exit status of a program that does not take the scene."""
+    print(why)
+    sys.exit(77)
+
+
 def read(folder: Path) -> Scene:
-    """The scene that ``export`` wrote into a ``folder``; ends with a sentence where it has no law that a candidate stands for."""
+    """The scene that ``export`` wrote into a ``folder``; refused where it has no law that a candidate stands for."""
     said, mesh = json.loads((folder / "scene.json").read_text()), meshio.read(folder / "tets.vtu")
     laws = dict[str, Any]()  # of the first region, where there are several
     for effect in said["effects"]:
         laws.setdefault(effect["name"], effect["parameters"])
     if not set(LAW) <= set(laws):
-        sys.exit(f"the scene has {', '.join(laws)}; wanted {' and '.join(LAW)}, which the solver's own law stands for")
+        refuse(f"the scene has {', '.join(laws)}; wanted {' and '.join(LAW)}, which the solver's own law stands for")
     tets = mesh.cells_dict["tetra"]
     corners = mesh.points[tets]
     turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
@@ -189,8 +195,10 @@ def main(make: Any, package: str, **kinds: type) -> None:
     given = vars(words.parse_args())
     folder, out, steps = given.pop("scene"), given.pop("out"), given.pop("steps")
     scene = read(folder)
-    skin, solver = Skin(folder, scene), make(scene, **given)
     takes = tomllib.loads(Path(sys.argv[0]).with_name("candidate.toml").read_text()).get("takes", [])
+    if not len(scene.held) and "contact" not in takes:
+        refuse("no vertex is held by a bone, and contact is left out: nothing moves the muscle")
+    skin, solver = Skin(folder, scene), make(scene, **given)
     left_out = [effect for effect in scene.effects if effect not in (*LAW, *takes)] + list(solver.lost)
     spent = drive(solver, scene, steps, lambda frame, points: skin.write(out / f"frame_{frame:04d}.ply", points))
     numbers = scene.frames[-1] - scene.frames[0]

@@ -64,6 +64,8 @@ def measure(name: str, folder: Path | None, commit: str) -> None:
 
 def _make(measurement: Measurement, path: Path) -> None:
     """Measure, and write the JSON of the verb to ``path``; that of several cases by their names, also where one has no solution."""
+    if not measurement.command.startswith("./fem "):
+        sys.exit(f"first {measurement.command}, and then --from its folder")
     found = {}
     for case in measurement.cases or ("",):
         words = shlex.split(measurement.command.replace("CASE", case))[1:]

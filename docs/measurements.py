@@ -33,6 +33,11 @@ _TURNED = (
     """'bone[2].motion.keyframes=[{{frame=0,angle="0rad"}},{{frame=30,angle="-0.3rad"}},{{frame=90,angle="0.3rad"}}]'"""
 )
 _PROGRAMS = ("newton_vbd", "mujoco_flex", "pbat_vbd", "pbat_xpbd", "pypbd_xpbd", "drake_fem")
+_STANDING = ("hip_flexion_tendon", "hip_flexion", "box_squeeze", "adductor_brevis", "gluteus_medius")
+_DRAWN = " ".join(f"my_data/scenes/muscle_{number}" for number in ("0001", "0004", "0005"))
+_LIMITED = "--time-limit '120 s' " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS)
+_FAST_PROGRAMS = ("mujoco_flex",)
+_HARD = "at_rest bones degenerate fibres hip incompressible moved_away round_edge squeeze_bonded squeeze_sliding start twist"
 _TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
 
 
@@ -248,8 +253,8 @@ def _uncertainty(found: dict[str, Any]) -> Any:
     return {"runs": found["runs"], "failures": len(found["failures"]), "seconds": found["seconds"]} | rows
 
 
-def _uncertainty_bands() -> str:
-    measured = kept("uncertainty")["measured"]
+def _uncertainty_bands(file: str) -> str:
+    measured = kept(file)["measured"]
     keys, titles = zip(*((one["key"], one["title"]) for one in measured["parameters"]), strict=True)
     rows = []
     for one in measured["bands"]:
@@ -258,11 +263,11 @@ def _uncertainty_bands() -> str:
             f"{100 * one['first'][key]:.0f} / {100 * one['total'][key]:.0f} %" if one["first"] else "" for key in keys
         )
         rows.append((one["title"], *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
-    return table("uncertainty", ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
+    return table(file, ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
 
 
-def _uncertainty_candidates() -> str:
-    measured = kept("uncertainty")["measured"]
+def _uncertainty_candidates(file: str) -> str:
+    measured = kept(file)["measured"]
     bands = [one for one in measured["bands"] if not one["refused"]]
     rows = dict[str, dict[str, str]]()
     for one in measured["placed"]:
@@ -270,7 +275,7 @@ def _uncertainty_candidates() -> str:
         rows.setdefault(one["candidate"], {})[one["quantity"]] = one["word"] + beyond
     head = ("candidate", *(f"{one['title']}, {one['unit']}" for one in bands))
     cells = ((f"`{name}`", *(row.get(one["quantity"], "") for one in bands)) for name, row in rows.items())
-    return table("uncertainty", head, cells)
+    return table(file, head, cells)
 
 
 def _reference() -> str:
@@ -302,18 +307,24 @@ _MOVED = {
 
 
 def _collagen(found: dict[str, Any]) -> Any:
-    (left,) = (one for one in found["ablations"][0]["omissions"] if one["left_out"] == ["collagen_across"])
-    return {name: _only(of, _MOVED) for name, of in (("changes", left["changes"]), ("bars", found["bars"]))}
+    kept = {}
+    for case, one in found.items():
+        (left,) = (each for each in one["ablations"][0]["omissions"] if each["left_out"] == ["collagen_across"])
+        kept[case] = {"changes": _only(left["changes"], _MOVED), "bars": _only(one["bars"], _MOVED)}
+    return kept
 
 
 def _collagen_rows() -> str:
-    """The change of each statistic, and its error bar; KeyError where one is missing."""
-    measured, units = kept("collagen")["measured"], ("mm", "mm", "%", "%")
-    rows = [
-        (name, *(f"{number(measured[name][key], 2)} {unit}" for key, unit in zip(_MOVED, units, strict=True)))
-        for name in ("changes", "bars")
-    ]
-    return table("collagen", ("", *_MOVED.values()), rows)
+    """By case the change of each statistic ± its error bar; KeyError where one is missing."""
+    rows = []
+    for case, one in kept("collagen")["measured"].items():
+        found = ((one["changes"][key], one["bars"][key]) for key in _MOVED)
+        cells = (
+            f"{number(change, 2)} ± {number(bar, 2)} {unit}"
+            for (change, bar), unit in zip(found, ("mm", "mm", "%", "%"), strict=True)
+        )
+        rows.append((f"`{case}`", *cells))
+    return table("collagen", ("change ± its error bar", *_MOVED.values()), rows)
 
 
 def _omission_rows() -> str:
@@ -439,6 +450,49 @@ def _stress_solvers() -> str:
     return table("stress", ("solver", *VERDICTS), rows)
 
 
+def _hard_programs(found: dict[str, Any]) -> Any:
+    kept_keys = ("case", "solver", "verdict", "sentence", "quantity", "unit", "value", "bound")
+    return [{key: one.get(key) for key in kept_keys} for one in found["cells"]]
+
+
+def _hard_programs_rows() -> str:
+    """By case the verdict on each program, where one of them takes what acts."""
+    cells = kept("stress_programs")["measured"]
+    programs = list(dict.fromkeys(one["solver"] for one in cells))
+    taken = dict.fromkeys(one["case"] for one in cells if one["verdict"] != "not applicable")
+    by_place = {(one["case"], one["solver"]): _hard_verdict(one) for one in cells}
+    rows = [(f"`{case}`", *(by_place[case, name] for name in programs)) for case in taken]
+    return table("stress_programs", ("case", *(f"`{name}`" for name in programs)), rows)
+
+
+def _hard_verdict(one: dict[str, Any]) -> str:
+    if one["verdict"] == "not applicable":
+        return "-"
+    if one["verdict"] == "degraded":
+        return (
+            f"degraded: {one['quantity'].replace('_', ' ')} {one['value']:.2g} {one['unit']}, at most {one['bound']:g}"
+        )
+    return one["verdict"] if one["verdict"] == "ok" else f"{one['verdict']}: {one['sentence'].split(';')[0]}"
+
+
+def _hard_programs_left_out() -> str:
+    """By reason the cases that programs do not take."""
+    found = dict[str, dict[str, list[str]]]()
+    for one in kept("stress_programs")["measured"]:
+        if one["verdict"] == "not applicable":
+            found.setdefault(one["sentence"].partition(", want")[0], {}).setdefault(one["case"], []).append(
+                one["solver"]
+            )
+    rows = []
+    for reason, cases in found.items():
+        names = dict.fromkeys(name.partition(".")[0] for name in cases)
+        programs = dict.fromkeys(name for each in cases.values() for name in each)
+        rows.append(
+            (reason, len(cases), ", ".join(f"`{name}`" for name in names), ", ".join(f"`{name}`" for name in programs))
+        )
+    return table("stress_programs", ("not applicable, because", "cases", "of", "to"), rows)
+
+
 def _stress_steps() -> str:
     rows = []
     for one in kept("stress")["measured"]["ends"]:
@@ -481,42 +535,61 @@ def _cell(one: dict[str, Any] | None, name: str) -> str:
 
 
 def _standings(found: dict[str, Any]) -> Any:
-    kept_keys = ("case", "group", "name", "version", "status", "unsound", "seconds_per_frame", "split")
+    kept_keys = ("case", "group", "name", "version", "status", "unsound", "seconds_per_frame", "split", "time_limit")
     return [{key: row[key] for key in kept_keys} | {"rms": row["worst"].get(_SURFACE)} for row in found["rows"]]
 
 
-def _standings_rows() -> str:
+def _standings_rows(file: str) -> str:
     """By solver its error on each case; in bold where it is no answer."""
-    rows = [row for row in kept("standings")["measured"] if row["rms"] is not None]
+    rows = [row for row in kept(file)["measured"] if row["rms"] is not None or _failed(row)]
     cases = list(dict.fromkeys(row["case"] for row in rows))
     found = []
     for group, name in dict.fromkeys((row["group"], row["name"]) for row in rows):
         own = {row["case"]: row for row in rows if row["name"] == name}
-        times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"]]
+        times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"] and not _failed(row)]
         time = f"{1e3 * median(times):.3g} ms" if times else "-"
         found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
-    return table("standings", ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
+    return table(file, ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
 
 
 def _standing(row: dict[str, Any] | None) -> str:
     if row is None:
         return "-"
-    return (
-        f"**{row['unsound'].split(':')[0] or row['status']}**"
-        if row["unsound"] or row["status"] != "converged"
-        else f"{row['rms']:.3g}"
-    )
+    late = f"not within {row['time_limit']:g} s" if row["status"] == "timed out" else row["status"]
+    return f"**{row['unsound'].split(':')[0] or late}**" if _failed(row) else f"{row['rms']:.3g}"
 
 
-def _standings_parts() -> str:
+def _failed(row: dict[str, Any]) -> bool:
+    return bool(row["unsound"]) or row["status"] != "converged"
+
+
+def _learned_rows() -> str:
+    """By solver its mean distance on poses and on shapes that were not learned from."""
+    rows = kept("learned")["measured"]
+    counts = {row["split"]: f"{row['split']}s not seen, {row['muscles']} muscles" for row in rows}
+    found = []
+    for name in sorted(
+        {row["solver"] for row in rows}, key=lambda name: [row["error"] for row in rows if row["solver"] == name]
+    ):
+        own = {row["split"]: row for row in rows if row["solver"] == name}
+        lost = {split: f", {len(row['lost'])} not solved" for split, row in own.items() if row.get("lost")}
+        cells = [
+            f"{row['error']:.2f} mm, {number(row['seconds'] / row['muscles'], 2)} s{lost.get(split, '')}"
+            for split, row in own.items()
+        ]
+        found.append(("Learned" if own["pose"]["learned"] else "Not learned", f"`{name}`", *cells))
+    return table("learned", ("kind", "solver", *counts.values()), found)
+
+
+def _standings_parts(file: str) -> str:
     """By program with a law of its own, the parts of its error on each case that could be split."""
-    rows = [row for row in kept("standings")["measured"] if row["split"]]
+    rows = [row for row in kept(file)["measured"] if row["split"]]
     names = list(dict.fromkeys(name for row in rows for name in row["split"]))
     found = [
         (f"`{row['name']}`", f"`{row['case']}`", f"{row['rms']:.3g}", *(f"{row['split'][name]:.2g}" for name in names))
         for row in rows
     ]
-    return table("standings", ("solver", "case", "error", *names), found)
+    return table(file, ("solver", "case", "error", *names), found)
 
 
 MEASUREMENTS = {
@@ -524,10 +597,11 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "collagen": Measurement(
-        "./fem effects adductor_brevis --set muscle.refinements=0 --set frames.last=100 --set frames.every=20 "
+        "./fem effects CASE --set muscle.refinements=0 --set frames.last=100 --set frames.every=20 "
         """--set candidate=[] --set expect=[] --set 'effect=[{name="neo_hooke",mu="10kPa"},{name="incompressible",bulk="10MPa"},"""
         """{name="contact",stiffness="500kPa/mm",smoothing="0.3mm"},{name="collagen_across",k1="200kPa",k2=1.5}]'""",
         _collagen,
+        ("hip_flexion", "adductor_brevis", "gluteus_medius", "gluteus_medius_anatomical", "iliacus_anatomical"),
     ),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "fibre_ends": Measurement(
@@ -545,12 +619,21 @@ MEASUREMENTS = {
         _fronts,
     ),
     "stress": Measurement("./fem stress --steps", _stress),
+    "stress_programs": Measurement(
+        f"./fem stress {_HARD} " + " ".join(f"--program candidates/{name}" for name in _FAST_PROGRAMS), _hard_programs
+    ),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
+    "uncertainty_iliacus": Measurement(
+        "./fem uncertainty iliacus_anatomical --set muscle.tet_size=7mm --set frames.last=100", _uncertainty
+    ),
     "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
     "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
     "standings": Measurement(
-        "./fem standings --quick " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS), _standings
+        f"./fem standings {' '.join(_STANDING)} --quick --set frames.last=200 --set frames.every=25 {_LIMITED}",
+        _standings,
     ),
+    "standings_drawn": Measurement(f"./fem standings {_DRAWN} {_LIMITED}", _standings),
+    "learned": Measurement("python examples/data_set/baselines.py my_data learned.json", list),
     "credibility": Measurement("./fem page credibility", _credibility),
     "table_5_1": Measurement(
         "./fem page table-5-1 --case hip_flexion --case gluteus_maximus --case gluteus_medius --case iliacus_anatomical "
@@ -569,15 +652,22 @@ TABLES = {
     "fibre_ends": _fibre_ends_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
-    "uncertainty_bands": _uncertainty_bands,
-    "uncertainty_candidates": _uncertainty_candidates,
+    "stress_programs_verdicts": _hard_programs_rows,
+    "stress_programs_left_out": _hard_programs_left_out,
+    "uncertainty_bands": partial(_uncertainty_bands, "uncertainty"),
+    "uncertainty_candidates": partial(_uncertainty_candidates, "uncertainty"),
+    "uncertainty_iliacus_bands": partial(_uncertainty_bands, "uncertainty_iliacus"),
+    "uncertainty_iliacus_candidates": partial(_uncertainty_candidates, "uncertainty_iliacus"),
     "credibility_grades": _credibility_grades,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,
     "arms_adduction": partial(_arms_about_rows, "arms_adduction"),
     "arms_rotation": partial(_arms_about_rows, "arms_rotation"),
-    "standings_solvers": _standings_rows,
-    "standings_parts": _standings_parts,
+    "standings_solvers": partial(_standings_rows, "standings"),
+    "standings_parts": partial(_standings_parts, "standings"),
+    "standings_drawn_solvers": partial(_standings_rows, "standings_drawn"),
+    "standings_drawn_parts": partial(_standings_parts, "standings_drawn"),
+    "learned_solvers": _learned_rows,
     "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
     "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
     "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),

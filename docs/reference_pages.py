@@ -30,6 +30,7 @@ from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers.command import Description
 from fem_reference.solvers.recorded import About
 from fem_reference.studies.hard.records import Hard
 
@@ -63,7 +64,13 @@ def effect_records() -> dict[str, list[type[Record]]]:
 
 def file_records() -> dict[str, list[type[Record]]]:
     """By the name of another file that people write or read its record and those inside, but those of scenes."""
-    files = {"candidate.toml": About, "a hard case": Hard, "a baseline": Baseline, "run.json": Contents}
+    files = {
+        "candidate.toml": About,
+        "candidate.toml of a program": Description,
+        "a hard case": Hard,
+        "a baseline": Baseline,
+        "run.json": Contents,
+    }
     known = scene_records()
     return {name: [one for one in dict.fromkeys(_and_below(top)) if one not in known] for name, top in files.items()}
 

@@ -15,7 +15,8 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -123,24 +124,29 @@ def fuzz(name: str, inputs: int, number: int, kept: Path) -> Tried:
     return tried
 
 
-def fuzz_calls(name: str, inputs: int, number: int) -> Tried:
+@contextmanager
+def world() -> Iterator[calls.World]:
+    """What calls are made with, and one process that solves."""
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as place, fenicsx.shared():
+        yield calls.World(Path(place))
+
+
+def fuzz_calls(name: str, inputs: int, number: int, at: calls.World) -> Tried:
     """Try so many calls of a kind, in this process; what failed is said by what was called with."""
     tried = Tried()
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as place, fenicsx.shared():
-        world = calls.World(Path(place))
 
-        @seed(number)
-        @settings(UNTIMED, max_examples=inputs)
-        @given(calls.KINDS[name](world))
-        def attempt(call: Callable[[], object]) -> None:
-            began = time.perf_counter()
-            came = called(call)
-            tried.slowest = max(tried.slowest, time.perf_counter() - began)
-            tried.count[came if came in ("accepted", "refused", "wrong signature") else "failed"] += 1
-            if came not in ("accepted", "refused", "wrong signature"):
-                tried.failed.append(f"{name}: {came}: {_closure(call)}")
+    @seed(number)
+    @settings(UNTIMED, max_examples=inputs)
+    @given(calls.KINDS[name](at))
+    def attempt(call: Callable[[], object]) -> None:
+        began = time.perf_counter()
+        came = called(call)
+        tried.slowest = max(tried.slowest, time.perf_counter() - began)
+        tried.count[came if came in ("accepted", "refused", "wrong signature") else "failed"] += 1
+        if came not in ("accepted", "refused", "wrong signature"):
+            tried.failed.append(f"{name}: {came}: {_closure(call)}")
 
-        attempt()
+    attempt()
     return tried
 
 
@@ -196,6 +202,18 @@ def shares(name: str, names: Sequence[str]) -> int:
     return len(names) if len(alike) == len(names) else 2 * len(alike)
 
 
+def every(names: Sequence[str], options: argparse.Namespace) -> Iterator[tuple[str, Tried]]:
+    """What came of each kind: of files, which are read in processes that fork, before calls."""
+    counts = {name: -(-options.inputs // shares(name, names)) for name in names}
+    of_calls = [name for name in names if name in calls.KINDS]
+    for name in names:
+        if name in hostile.KINDS:
+            yield name, fuzz(name, counts[name], options.seed, options.kept)
+    with world() if of_calls else nullcontext() as at:
+        for name in of_calls:
+            yield name, fuzz_calls(name, counts[name], options.seed, at)
+
+
 def main() -> int:
     """Try every kind, or those named; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -206,13 +224,7 @@ def main() -> int:
     options = parser.parse_args()
     names = options.kinds or KINDS
     failed, total = [], 0
-    for name in names:
-        count = -(-options.inputs // shares(name, names))
-        tried = (
-            fuzz(name, count, options.seed, options.kept)
-            if name in hostile.KINDS
-            else fuzz_calls(name, count, options.seed)
-        )
+    for name, tried in every(names, options):
         total += sum(tried.count.values())
         failed += tried.failed
         counts = ", ".join(f"{count} {word}" for word, count in sorted(tried.count.items()))

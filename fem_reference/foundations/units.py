@@ -10,7 +10,6 @@ from functools import cache, partial
 from numbers import Real
 from typing import Annotated, Any, NamedTuple
 
-import pint
 from pydantic import BeforeValidator
 
 # The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
@@ -63,7 +62,9 @@ _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> Any:
+    import pint  # a sixth of a second, for processes that read no text
+
     return pint.UnitRegistry(cache_folder=None)
 
 

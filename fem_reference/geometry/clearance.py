@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, minimum_filter
 
 from fem_reference.foundations.mesh import Floats
 
@@ -44,7 +44,9 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
     nodes = np.zeros(coefficients.shape, bool)
     for corner in np.ndindex(2, 2, 2):
         nodes[tuple(slice(1 + i, 1 + i + count) for i, count in zip(corner, low.shape, strict=True))] |= low
-    away = distance_transform_edt(~nodes, sampling=spacing) if nodes.any() else np.full(nodes.shape, np.inf)
+    away = (
+        scipy.ndimage.distance_transform_edt(~nodes, sampling=spacing) if nodes.any() else np.full(nodes.shape, np.inf)
+    )
     return Clearance(np.asarray(away), np.asarray(origin, float), spacing)
 
 
@@ -65,4 +67,4 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """The least of four neighbours along each axis, which gets shorter by three."""
-    return np.asarray(minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])
+    return np.asarray(scipy.ndimage.minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import roots_jacobi, roots_legendre
+import scipy
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, read_only
@@ -162,11 +162,11 @@ def rule(corners: int) -> tuple[Floats, Floats]:
     to 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate Calculation of
     Multiple Integrals, 2.4).
     """
-    x, w = roots_legendre(POINTS)
+    x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2
     if corners == 2:
         return np.column_stack([1 - along, along]), weights
-    x, w = roots_jacobi(POINTS, 1, 0)
+    x, w = scipy.special.roots_jacobi(POINTS, 1, 0)
     from_side, others = np.repeat((1 + x) / 2, POINTS), np.tile(along, POINTS)
     barycentric = np.column_stack([(1 - from_side) * (1 - others), (1 - from_side) * others, from_side])
     return barycentric, np.repeat(w / 2, POINTS) * np.tile(weights, POINTS)

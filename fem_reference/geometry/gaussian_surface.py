@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.cluster.vq import kmeans2
-from scipy.optimize import least_squares
+import scipy
 from scipy.spatial.distance import cdist
-from scipy.special import logsumexp
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
@@ -37,7 +35,7 @@ class GaussianSurface:
     def level(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Log of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; shares (n, m) of the Gaussians."""
         exponents = -cdist(points, self.centres, "sqeuclidean") / self.radii**2
-        level = logsumexp(exponents, axis=1)
+        level = scipy.special.logsumexp(exponents, axis=1)
         shares = np.exp(exponents - level[:, None])
         weights = 2 * shares / self.radii**2
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
@@ -72,7 +70,7 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
 def _fit(surface: Surface, count: int) -> GaussianSurface:
     """The fit to a ``surface`` along its principal axes, of volume 1."""
     bounds, inside = np.log(_RADII), _inside(surface)
-    centres, found = kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
+    centres, found = scipy.cluster.vq.kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
     squares = np.bincount(found, ((inside - centres[found]) ** 2).sum(axis=1), count)
     spread = np.maximum(squares / np.maximum(np.bincount(found, minlength=count), 1), 1.01 * np.exp(2 * bounds[0]))
     samples, distances = _samples(surface)
@@ -83,7 +81,7 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
     for _ in range(_ROUNDS):
         slopes = np.linalg.norm(_surface(unknowns).level(samples)[1], axis=1)
         lengths = 1 / np.maximum(slopes, np.quantile(slopes, 0.05))
-        unknowns = least_squares(
+        unknowns = scipy.optimize.least_squares(
             lambda q, lengths=lengths: _surface(q).level(samples)[0] * lengths - distances,
             unknowns,
             jac=lambda q, lengths=lengths: _slopes(_surface(q), samples) * lengths[:, None],

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import permutations
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 from scipy.spatial import cKDTree
 
 from fem_reference.foundations.errors import InputError
@@ -275,7 +275,7 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
     from those of the cube to the sphere. Faces: outer, x0, y0, z0.
     """
     size, far = core / n, outer - core
-    growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
+    growth = scipy.optimize.brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
 
     def shell(face: Floats, direction: Floats, depth: Floats) -> Floats:
         share = (growth ** (layers * depth) - 1) / (growth**layers - 1)

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.ndimage import binary_erosion
 
 COLOURS = "viridis"
 SIDE = 840
@@ -69,7 +69,7 @@ def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction
     if outline is not None:
         flat = {"color": "black", "lighting": False}
         body = _render([(_surface(outline, job["triangles"]), flat)], camera)[:, :, 0] < 128
-        picture[body & ~binary_erosion(body, _NEAR)] = _LINE
+        picture[body & ~scipy.ndimage.binary_erosion(body, _NEAR)] = _LINE
     return Image.fromarray(picture).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
 
 

@@ -1,5 +1,7 @@
 """The page ``standings``: solvers of all kinds over cases, one table on top, and a table of each case."""
 
+from collections.abc import Iterable
+
 from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
 from fem_reference.metrics import described
 from fem_reference.report.pages import Page
@@ -15,13 +17,19 @@ def page(found: Standings) -> Page:
     contents = {
         "limits": [f"{limit:g} s" for limit in limits],
         "found": found,
-        "columns": COLUMNS,
+        "columns": {case: _columns(found.of(case)) for case in found.cases},
         "longest": longest or 1.0,
         "matched": (MATCHED_ERROR, MATCHED_TIME),
     }
     said = f"{len(found.rows)} results on {len(found.cases)} cases"
     numbers = found.model_dump(mode="json")
     return Page("standings", "Standings", (("", "", said),), "standings_page.html", contents, numbers)
+
+
+def _columns(rows: Iterable[Standing]) -> list[tuple[str, str, str]]:
+    """The columns of a case in which a row has a value: few solvers have forces."""
+    known = {name for row in rows for name, value in (*row.worst.items(), *row.bars.items()) if value is not None}
+    return [column for column in COLUMNS if column[0] in known]
 
 
 def text(found: Standings) -> str:

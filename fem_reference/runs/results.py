@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import roots_jacobi
 
 from fem_reference.effects import Effect, Energy, State, elastic_state, in_situ, regions_named
 from fem_reference.foundations.errors import InputError
@@ -266,7 +266,7 @@ def _rule() -> tuple[Floats, Floats]:
     """Barycentric coordinates (27, 4) and shares of the volume (27,) of a rule that is exact to degree 5: Gauss-Jacobi points on
     lines to one corner, on those of the opposite side to another, and along its edge (Stroud 1971, conical product).
     """
-    (u, a), (v, b), (w, c) = (roots_jacobi(3, power, 0) for power in (2, 1, 0))
+    (u, a), (v, b), (w, c) = (scipy.special.roots_jacobi(3, power, 0) for power in (2, 1, 0))
     x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
     rest = (1 - x) * (1 - y)
     shares = a[:, None, None] * b[:, None] * c

@@ -36,6 +36,7 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
+REFUSED = 77  # the exit status of a program that does not take a scene, as that of a test that Automake skips
 # What a Python of its own executes: a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -127,9 +128,7 @@ def choice(command: str, directory: Path, place: str) -> Candidate:
     file = next((path for path in places if path.exists()), places[-1])
     said = parse(Description, texts.toml(file), str(file)) if file.exists() else Description()
     if said.seconds_per_frame is not None or said.threads is not None:
-        want = (
-            f"neither here: time is measured, or stated by a {recorded.ABOUT} that the command writes into its folder"
-        )
+        want = f"neither here: time is measured, or stated by a {recorded.ABOUT} that the command writes"
         raise InputError(file, "seconds_per_frame or threads", want)
     for key in [*said.settings, *said.ladder]:
         _check_named(key, names, f"{file}: {'settings' if key in said.settings else 'ladder'}")
@@ -242,9 +241,9 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, with the frames in ``out``: all of those wanted, or those before the first that is
-    missing or damaged.
-    """
+    """The outcome of a program that ``ended``, and its frames up to the first missing or damaged one; InputError if it refused."""
+    if ended.code == REFUSED:
+        raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program takes")
     kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
     try:
         said = recorded.checked_about(out, settings.unit)
@@ -262,7 +261,8 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
         return Outcome(status, f"{why}{last}; {reached}", cost)
     if ended.code:
         how = f"signal {-ended.code}" if ended.code < 0 else f"exit status {ended.code}"
-        return Outcome("crashed", f"{how} after {took}{last}; {reached}", cost)
+        program = programs.found(shlex.split(settings.command)[0], settings.place)
+        return Outcome("crashed", f"{how} of {program} after {took}{last}; {reached}", cost)
     if trouble is not None:
         failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
         why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
@@ -290,11 +290,5 @@ def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended)
     return found | {"seconds_per_frame": said.seconds_per_frame, "seconds_solve": seconds}
 
 
-SOLVES = (
-    CommandSolver(
-        settings=CommandSettings,
-        solve=solve,
-        require=require,
-        example={"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10},
-    ),
-)
+_EXAMPLE = {"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10}
+SOLVES = (CommandSolver(settings=CommandSettings, solve=solve, require=require, example=_EXAMPLE),)

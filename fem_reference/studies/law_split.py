@@ -1,14 +1,15 @@
 """Error of a solver with tetrahedra as a sum: what it left out, its law, its mesh, its convergence, by references in its law."""
 
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from fem_reference.effects import Effect, make, moduli, name_of, regions_named
+from fem_reference.effects import Effect, Energy, find, make, moduli, name_of, names, regions_named
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import vertex_areas
+from fem_reference.foundations.mesh import diagonal, vertex_areas
 from fem_reference.metrics import rms
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
@@ -63,6 +64,7 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
     """References without what the solver leaves out; in its law; and so with linear tetrahedra."""
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
+    _check_held(bench)
     held = tuple(one.model_copy(update={"stiffness": None}) for one in case.attachment)
     whole = [one for one in case.effects if name_of(one) in LAW]
     own = [law] if moduli([law]).shear else [law, make("neo_hooke", mu=_WEAK * moduli([law]).bulk)]
@@ -82,6 +84,17 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
         yield made
 
 
+def _check_held(bench: Bench[MuscleCase]) -> None:
+    """InputError where no solver can hold the muscle exactly: without attachments, and by springs whose stiffness times its size is
+    below its shear modulus.
+    """
+    case, size = bench.scene, diagonal(bench.setup().surface.points)
+    soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
+    if soft or not case.attachment:
+        got = f"springs softer than the muscle: {', '.join(soft)}" if soft else "nothing"
+        raise InputError(f"{case.place}: attachment", got, "attachments that a solver can hold exactly")
+
+
 def _apart(one: Run, other: Run, i: int) -> float:
     away = np.linalg.norm(one.positions[i] - other.positions[i], axis=1)
     return float(rms(away[None], vertex_areas(one.surface.points, one.surface.triangles))[0])
@@ -91,3 +104,17 @@ def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
     """The effect ``name`` with the parameters of the matrix of a ``case``."""
     mu, second = lame(case, poisson)
     return make(name, mu=mu, lame=second)
+
+
+def check_law(name: str, poisson: object, place: str) -> None:
+    """InputError, which names the ``place`` of a solver's keys, where the reference has no such law with Lame's parameters, or
+    ``poisson`` is no Poisson's ratio.
+    """
+    known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
+    if name not in known:
+        raise InputError(
+            f"{place}: law", f'"{name}"', f"{', '.join(known)}, or no key law: then the error is not split"
+        )
+    if not isinstance(poisson, float) or not 0 < poisson < 0.5:
+        got = "nothing" if poisson is None else str(poisson)
+        raise InputError(f"{place}: settings.poisson", got, "the Poisson's ratio between 0 and 0.5 that goes with law")

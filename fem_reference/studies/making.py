@@ -119,7 +119,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
     if watch is not None:
         list(seen(watch, writer.folder, writer.frames))  # stored by a process before this one
     forget_peak_memory()
-    began, clock = time.process_time(), MachineTime.now()
+    clock, began = MachineTime.now(), time.process_time()
     try:
         outcome = solve(add)
         if watch is not None and outcome.status == "converged":

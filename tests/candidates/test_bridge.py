@@ -14,6 +14,7 @@ import turned_bar
 import fem_reference as fr
 from candidates import bridge
 from fem_reference.scenes.case import Case
+from fem_reference.solvers import command
 
 HERE = Path(bridge.__file__).parent
 # By candidate: the module that it needs, settings that take seconds, its own law, and how far [mm] (rms) it may be from the minimum
@@ -112,11 +113,20 @@ def test_what_is_left_out_is_printed_and_kept(case, exported, tmp_path, monkeypa
     )  # the far corner moves by more than 2 sin(1/2) 45 mm
 
 
-def test_another_law_is_refused_with_a_sentence(exported) -> None:
+def test_what_a_candidate_cannot_take_is_refused_with_a_sentence(exported, tmp_path, monkeypatch, capsys) -> None:
+    """Another law, and a muscle that only contact moves, for who has none: at rest it would look healthy."""
     said = json.loads((exported / "scene.json").read_text())
     (exported / "scene.json").write_text(json.dumps(said | {"effects": said["effects"][:1]}))
-    with pytest.raises(SystemExit, match="the scene has neo_hooke; wanted neo_hooke and incompressible"):
-        bridge.read(exported)
+    words = ["--steps", "2", str(exported), str(tmp_path)]
+    for refused in ("the scene has neo_hooke; wanted", "no vertex is held by a bone"):
+        monkeypatch.setattr(sys, "argv", [str(HERE / "mujoco_flex" / "x.py"), *words])
+        with pytest.raises(SystemExit) as ended:
+            bridge.main(Follower, "numpy")
+        assert ended.value.code == command.REFUSED
+        assert capsys.readouterr().out.startswith(refused)
+        head = (exported / "attachment_facets.csv").read_text().splitlines()[0]
+        (exported / "scene.json").write_text(json.dumps(said | {"attachments": []}))
+        (exported / "attachment_facets.csv").write_text(head + "\n")
 
 
 def test_every_candidate_is_short_and_states_what_it_is() -> None:

@@ -8,11 +8,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import fem_reference as fr
 from fem_reference.foundations.subprocesses import environment
+from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx import processes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -45,6 +48,7 @@ def output(folder: Path, *words: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_it_ends_in_its_number(folder: Path, script: Path, monkeypatch, capsys) -> None:
     text = script.read_text(encoding="utf-8")
@@ -117,3 +121,25 @@ def test_learned_baselines_find_what_they_can_represent(monkeypatch) -> None:
     for name, within in (("kernel", 1e-4), ("network", 0.2)):
         away = found[name](x, truth(x), at) - truth(at)
         assert np.sqrt((away**2).mean()) < within * truth(at).std(), name
+
+
+def test_errors_of_shipped_solvers_on_a_data_set_are_of_the_frames_to_test_with(monkeypatch, tmp_path) -> None:
+    """A solver that is off by its frame number in mm, and one muscle that it does not solve."""
+    monkeypatch.syspath_prepend(EXAMPLES / "data_set")
+    shipped = runpy.run_path(str(EXAMPLES / "data_set" / "baselines.py"))["shipped"]
+    test = {"muscle_1": [1, 3], "muscle_2": [1], "hip": [2]}
+    both = {"train": {name: [0] for name in test}, "test": test}
+    (tmp_path / "dataset.json").write_text(json.dumps({"splits": {"pose": both, "shape": both}}))
+    for name in test:
+        (tmp_path / "scenes" / name).mkdir(parents=True)
+        np.savez(tmp_path / "scenes" / name / "frames.npz", positions=np.zeros((4, 5, 3)))
+    away = np.zeros((4, 5, 3)) + np.arange(4)[:, None, None] * [0, 0, 1]
+
+    def solve(name: str, _: str) -> SimpleNamespace:
+        status = "converged" if name == "muscle_1" else "diverged"
+        return SimpleNamespace(positions=away, outcome=Outcome(status, "", {"seconds_processor": 2.0}))
+
+    monkeypatch.setattr(fr, "load_case", lambda folder: folder.name)
+    monkeypatch.setattr(fr, "solve", solve)
+    row = {"solver": "pbd", "learned": False, "error": 2.0, "muscles": 1, "seconds": 2.0, "lost": ["muscle_2"]}
+    assert [*shipped(tmp_path, "pbd")] == [{"split": split} | row for split in ("pose", "shape")]

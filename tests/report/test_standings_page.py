@@ -32,3 +32,18 @@ def test_the_text_has_a_line_for_each_row() -> None:
     assert "hip: PBD, lost 1: exploded: a vertex is 9e9 mm away" in lines  # without its small number
     assert any(line.startswith("hip: PBD, old 1: converged (stale), surface rms 2 mm, left out 0 mm") for line in lines)
     assert lines[-2:] == ["hip, new: left out, no such package", "changed: hip, old: 1 mm, now 2 mm"]
+
+
+def test_a_column_is_there_where_a_row_has_its_value() -> None:
+    with_forces = row("hill", None, worst={"joint_moment.moment": 768.0}, case="arm")
+    html = standings_page.page(Standings(rows=(TRUTH, row("near"), with_forces), missing={})).html()
+    hip, arm = html.split('<h2 id="arm">')
+    assert ("Joint, moment" in hip, "Joint, moment" in arm) == (False, True)
+    assert ("Surface, rms<small>mm" in hip, "Surface, rms<small>mm" in arm) == (True, False)
+
+
+def test_what_is_late_is_named_by_its_limit() -> None:
+    late = row("late", None, status="timed out", time_limit=60.0, message="ended at frame 40 after 61 s")
+    found = Standings(rows=(TRUTH, late), missing={})
+    assert "not within 60 s: ended at frame 40 after 61 s" in standings_page.page(found).html()
+    assert "hip: PBD, late 1: not within 60 s" in standings_page.text(found)

@@ -150,6 +150,12 @@ def test_the_time_of_frames_alone_is_what_the_program_states_unless_it_cannot_be
     assert "at most the" in outcome.message
 
 
+def test_a_program_that_does_not_take_the_scene_is_not_one_that_crashed(bar, tmp_path) -> None:
+    refuses = settings(tmp_path, program(tmp_path, "print('no tetrahedra'); sys.exit(77)"))
+    with pytest.raises(InputError, match="got no tetrahedra, want a scene that the program takes"):
+        solved(bar, refuses)
+
+
 @pytest.mark.parametrize("session", [False, True])
 def test_no_process_of_a_program_outlives_its_limit(bar, tmp_path, session) -> None:
     """One of its own works, the other waits, in a session of its own or not."""

@@ -41,6 +41,18 @@ def test_stiffness_of_another_effect_is_refused(bench) -> None:
         law_split.lame(bench.scene.model_copy(update={"effect": (*bench.scene.effect, across)}), 0.45)
 
 
+def test_what_nobody_holds_exactly_is_not_split(bench) -> None:
+    soft = [
+        one.model_copy(update={"stiffness": 1e-9}) for one in bench.scene.attachment
+    ]  # times 100 mm: 1e-7 of 0.01 MPa
+    law = law_split.law_of("st_venant_kirchhoff", bench.scene, 0.45)
+    for held, got in ((soft, "springs softer than the muscle: "), ([], "attachment: got nothing")):
+        other = Bench(bench.scene.model_copy(update={"attachment": tuple(held)}), bench.store)
+        other.reference = bench.reference  # which is not asked how it is held
+        with pytest.raises(InputError, match=got):
+            law_split.split(other, bench.reference(), law)
+
+
 def test_each_part_is_found_where_it_was_put(bench) -> None:
     law = law_split.law_of("st_venant_kirchhoff", bench.scene, 0.45)
     own = bench.scene.model_copy(

@@ -4,6 +4,7 @@ import importlib.util
 import logging
 import re
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from auto_scenes import ACTIVE, STILL, pennate, solved_as
 from fem_reference.assessment import error_bars
 from fem_reference.problems.problem import AtRest
 from fem_reference.runs.key import versions
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, load
 from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
@@ -65,6 +66,26 @@ def test_a_folder_that_is_locked_waits_for_its_turn(tmp_path: Path) -> None:
     assert said == ["first", "second"]
     with locked(tmp_path / "runs" / "one"), locked(tmp_path / "runs" / "two"):  # others do not wait
         assert not (tmp_path / "runs" / "one").exists()
+
+
+def test_a_run_over_its_time_ends_with_the_frames_that_it_reached(tmp_path: Path) -> None:
+    """No limit is nearer than none: a run within it converges."""
+    surface = shapes.sphere(0)
+
+    def solve(sink: Callable[[Frame], None]) -> Outcome:
+        for number in (0, 1, 2):
+            begin = time.process_time()
+            while time.process_time() < begin + 0.15:
+                pass
+            sink(Frame(number, surface.points))
+        return Outcome("converged", "")
+
+    for limit, status, reached in ((10.0, "converged", 3), (0.25, "timed out", 2)):
+        identity = {"name": "one", "solver": "test", "frames": (0, 1, 2), "origin": {}}
+        writer = Writer(tmp_path / status.split()[0], identity, AtRest(surface))
+        making.write(writer, solve, None, limit)
+        found = load(writer.folder)
+        assert (found.outcome.status, len(found.numbers)) == (status, reached)
 
 
 @pytest.mark.parametrize(("numpy", "kept"), [(None, True), ("0", False)])

@@ -13,12 +13,13 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.assessment.standings import ERROR
+from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.solvers import fenicsx, pbd
-from fem_reference.studies import standings, table_5_1
+from fem_reference.studies import law_split, standings, table_5_1
 
 pytestmark = pytest.mark.slow
 
@@ -175,6 +176,31 @@ def test_a_program_states_its_group_and_law() -> None:
     law = standings.program(Path(__file__).parents[2] / "candidates" / "mujoco_flex")
     assert (law.group, law.law, law.takes) == ("Implicit FEM", "st_venant_kirchhoff", ())
     assert casefile.read("hip_flexion").name in standings.CASES
+
+
+@pytest.mark.usefixtures("place")
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (
+            'law = "corotated"',
+            'still/candidate.toml: law: got "corotated", want squared_invariants, st_venant_kirchhoff',
+        ),
+        ('law = "contact"', 'law: got "contact", want squared_invariants'),
+        ('law = "stable_neo_hooke"', "candidate.toml: settings.poisson: got nothing, want the Poisson's ratio"),
+    ],
+)
+def test_a_law_that_cannot_be_split_is_refused_before_anything_is_solved(law, message, capsys) -> None:
+    about = Path("still/candidate.toml")
+    about.write_text(f"{law}\n{about.read_text()}")
+    assert cli.main(["standings", "./bar", "--program", "still"]) == cli.BAD_INPUT
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("poisson", [0.5, 0.0, -0.1, float("nan"), "0.45", True])
+def test_a_poisson_ratio_has_no_value_beyond_its_range(poisson) -> None:
+    with pytest.raises(InputError, match=r"settings\.poisson"):
+        law_split.check_law("stable_neo_hooke", poisson, "candidate.toml")
 
 
 @pytest.mark.usefixtures("place")

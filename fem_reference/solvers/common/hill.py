@@ -11,9 +11,8 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
@@ -82,7 +81,7 @@ class Hill(Record):
             want = "one on which fibres keep a tenth of their optimal length"
             raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
-        fibre = float(brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
+        fibre = float(scipy.optimize.brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
         return self.max_force * self.tendon_force(path, fibre), fibre
 
     def _fibre(self, path: float, strain: float) -> float:
@@ -110,7 +109,9 @@ class Hill(Record):
 
         lengths = [first]
         for start, end in pairwise(times):  # each with its own slopes
-            found = solve_ivp(rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance)
+            found = scipy.integrate.solve_ivp(
+                rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance
+            )
             lengths.append(float(found.y[0, -1]))
         shares = [self.tendon_force(float(path), one) for path, one in zip(paths, lengths, strict=True)]
         return self.max_force * np.array(shares), np.array(lengths)

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Annotated, Self
 
 import numpy as np
+import scipy
 from pydantic import Field, model_validator
-from scipy.interpolate import CubicHermiteSpline
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
@@ -72,7 +72,9 @@ class Guided:
         angles = [point.angle for point in self.via.curve]
         places = np.array([point.position for point in self.via.curve])
         angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])
-        return np.asarray(CubicHermiteSpline(angles, places, np.gradient(places, angles, axis=0))(angle))
+        return np.asarray(
+            scipy.interpolate.CubicHermiteSpline(angles, places, np.gradient(places, angles, axis=0))(angle)
+        )
 
 
 @dataclass(frozen=True, eq=False)
