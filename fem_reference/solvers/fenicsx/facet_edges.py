@@ -48,6 +48,18 @@ class FacetEdges:
             there = there.replaced(asked[inner], on[np.flatnonzero(inner)])
         return there, changed
 
+    def before(self, nodes: Floats, points: Floats, depths: Floats) -> NDArray[np.bool_]:
+        """True (n,) where ``points`` (n, 3) [mm] are in front of a facet at less than the ``depths`` (n,) [mm] at which they are
+        behind others: outside, then.
+        """
+        middles, radii = self.facets.balls(nodes)
+        found = np.zeros(len(points), bool)
+        some, facets = np.nonzero(np.linalg.norm(points[:, None] - middles, axis=2) < radii + depths[:, None])
+        there = self.facets.nearest(nodes, facets, points[some])
+        gap = np.vecdot(points[some] - there.point, there.normal)
+        found[some[(gap > 0) & (gap < depths[some]) & (self.facets.beyond(there.at) <= 0)]] = True
+        return found
+
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> tuple[FacetPlaces, NDArray[np.bool_]]:
         """The places on the edges of the facets ``which`` (n,) that are nearest to ``points`` (n, 3) [mm]; and True (n,) where the
         part does not end there and no place beside it is nearer.

@@ -23,6 +23,8 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
+# Searches in a load step after which a point that goes back and forth at a crease stays on its facet.
+_STRICT = 4
 # The unknowns (n,) of a search, what each pass met, its friction, and the shares of overlaps at rest that were subtracted.
 State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
@@ -34,18 +36,12 @@ class TouchingForces:
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
-        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
-        for law in body.touching:
-            names = dict.fromkeys((law.one, law.other))
-            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
-            low, high = parts[law.one], parts[law.other]
-            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
-            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
-        self.rims = self._rims(body, displacement)
+        self.unknowns, self.spent = displacement.unknowns, spent
+        self.passes, self.rims = self._passes(body, form, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
-        self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
+        self.rubbed, self.dissipated, self.looks = list[Rubbed | None](), 0.0, 0
         self.settled: State = np.array(self.unknowns.x.array), [], [], []
         self.move_to(body.frames[0])
         self.settle()
@@ -77,20 +73,32 @@ class TouchingForces:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
-    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
-        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
-        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
-        return [
-            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
-            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
-        ]
+    @staticmethod
+    def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
+        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
+        its points may not touch, None where there is none, or where it is felt.
+        """
+        both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
+        sides = [(law, *pair) for law, pairs in both for pair in pairs]
+        skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
+        own = {name: facets_of(displacement, body.mesh, form.regions[name]) for _, name, _ in sides}
+        passes, rims = list[Pass](), list[Pass | None]()
+        for (law, one, other), around in zip(sides, skins, strict=True):
+            felt = np.concatenate([form.regions[other], around]) if law.around and len(around) else None
+            skin = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
+            passes.append(Pass(law, own[one], skin, law.forces if one == law.one else law.forces[::-1]))
+            ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
+            rims.append(None if ends is None else Pass(law, own[one], ends, (one, other)))
+        return passes, rims
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
+                self.looks += 1
+                for one in self.passes:
+                    one.strict = self.looks <= _STRICT
                 none = [None] * len(self.passes)
                 lasts, thens = ([met for met, _ in state] or none for state in (self.now, self.settled[1]))
                 columns = zip(self.passes, lasts, thens, strict=True)
@@ -182,7 +190,7 @@ class TouchingForces:
             self.look()
         for side, (met, _) in zip(self.passes, self.now, strict=True):
             side.let_fall(met)
-        self.settled = self.state
+        self.settled, self.looks = self.state, 0
 
     @property
     def state(self) -> State:
@@ -195,6 +203,7 @@ class TouchingForces:
 
     def go_back(self, state: State | None = None) -> None:
         """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        self.looks = self.looks if state else 0
         self.seen, self.now, self.rubbed, shares = state or self.settled
         if shares != self.acting():  # its pressures are those of another frame
             self.seen = np.full_like(self.seen, np.nan)

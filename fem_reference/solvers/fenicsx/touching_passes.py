@@ -85,14 +85,13 @@ class Pass:
         corners = Delaunay(other.element.points).simplices  # of flat pieces of a facet
         turned = np.linalg.det(other.element.points[corners[:, 1:]] - other.element.points[corners[:, :1]]) < 0
         corners[turned] = corners[turned][:, ::-1]
-        self.overlaps, self.share = (
-            np.zeros(len(self.areas)),
-            0.0,
-        )  # at rest, and the share of them that is subtracted now
+        # At rest, and the share of them that is subtracted now.
+        self.overlaps, self.share = np.zeros(len(self.areas)), 0.0
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
         self.own = OwnPairs(side) if side is other else None
         # Friction follows places within facets alone, and a part with itself may be thin.
+        self.strict = True  # else a point stays on its facet whatever it feels there
         self.edges = None if law.friction or self.own else FacetEdges(other)
         # Below half the thickness of a part its other side is nearer. Parts of one that overlap at rest are not that.
         inset = law.smoothing if self.own else 0.0
@@ -135,7 +134,11 @@ class Pass:
         here = self._here(self.side.nodes(unknowns), some[felt])
         felt, here = felt[faces := np.vecdot(here.normal, there.normal[felt]) < 0], here[faces]
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt], on_edge[felt])
-        return found.some(self._first(found, beyond[felt], stays[felt]))
+        found = found.some(self._first(found, beyond[felt], stays[felt]))
+        outside = np.zeros(len(found.gap), bool)
+        if self.edges and (deep := found.gap < -self.law.smoothing).any():
+            outside[deep] = self.edges.before(nodes, found.here.point[deep], -found.gap[deep])
+        return found.some(np.flatnonzero(~outside))
 
     def _first(self, found: Met, beyond: Floats, stays: NDArray[np.bool_]) -> Ints:
         """For each of the points ``found`` the one with the nearest place, or that on the facet where it ``stays`` (n,)."""
@@ -145,7 +148,7 @@ class Pass:
         press = (self.law.smoothing - found.gap)[:, None] * found.there.normal
         change = np.linalg.norm(press[order] - press[first][which], axis=1)
         alike = change <= _ALIKE * np.linalg.norm(press[first][which], axis=1)
-        held = stays[order] & (alike | (beyond[order] <= 0) if self.edges else True)
+        held = stays[order] & (alike | (beyond[order] <= 0) if self.edges and self.strict else True)
         first[which[held]] = order[held]
         return first
 
@@ -249,6 +252,11 @@ class Pass:
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
+        travel = ends[near.points] - starts[near.points] + near.there.point
+        travel -= self.other.places(new, near.facets, near.there.at).point
+        free[near.points[(gap > 0) & (np.linalg.norm(travel, axis=1) < near.gap)]] = (
+            False  # flat pieces of a facet that bends
+        )
         free[near.points[near.gap <= 0]] = free[last.points[last.gap <= 0]] = False
         return np.union1d(behind, self._passed(starts, ends, old, new, free))
 

@@ -75,10 +75,21 @@ def test_points_behind_a_crease_press_its_edge_in_proportion_to_their_distance(e
 def test_the_force_has_no_jump_as_points_pass_a_crease(element) -> None:
     # By 0.5 um in a step: forces change in proportion, at most as the pressure on all points turns by the step over the depth.
     contact, upper = valley(element)
-    forces = [(at(contact, upper, x, 0.03), on_high(contact))[1] for x in np.arange(-0.06, 0.06, 5e-4)]
+    forces = [
+        (at(contact, upper, x, 0.03), on_high(contact), contact.settle())[1] for x in np.arange(-0.06, 0.06, 5e-4)
+    ]
     steps = np.linalg.norm(np.diff(forces, axis=0), axis=1)
     assert np.linalg.norm(forces, axis=1).min() > 1e-5
     assert steps.max() < 4 * K * 5e-4 * 0.04**2 / 2
+
+
+def test_a_point_in_front_of_a_facet_is_not_deep_behind_others() -> None:
+    contact, _ = valley("Q1/P0")
+    edges = contact.passes[1].edges
+    # 0.2 and 0.4 above a slope of 45 degrees, and as far behind it.
+    points = np.array([[0.8, 0.5, 0.8]] * 4) + np.outer([0.2, 0.4, -0.2, -0.4], np.array([-1, 0, 1]) / np.sqrt(2))
+    found = edges.before(edges.facets.rest, points, np.full(4, 0.3))
+    assert found.tolist() == [True, False, False, False]
 
 
 def test_beyond_the_end_of_a_part_there_is_no_edge() -> None:
