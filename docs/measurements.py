@@ -253,8 +253,8 @@ def _uncertainty(found: dict[str, Any]) -> Any:
     return {"runs": found["runs"], "failures": len(found["failures"]), "seconds": found["seconds"]} | rows
 
 
-def _uncertainty_bands() -> str:
-    measured = kept("uncertainty")["measured"]
+def _uncertainty_bands(file: str) -> str:
+    measured = kept(file)["measured"]
     keys, titles = zip(*((one["key"], one["title"]) for one in measured["parameters"]), strict=True)
     rows = []
     for one in measured["bands"]:
@@ -263,11 +263,11 @@ def _uncertainty_bands() -> str:
             f"{100 * one['first'][key]:.0f} / {100 * one['total'][key]:.0f} %" if one["first"] else "" for key in keys
         )
         rows.append((one["title"], *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
-    return table("uncertainty", ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
+    return table(file, ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
 
 
-def _uncertainty_candidates() -> str:
-    measured = kept("uncertainty")["measured"]
+def _uncertainty_candidates(file: str) -> str:
+    measured = kept(file)["measured"]
     bands = [one for one in measured["bands"] if not one["refused"]]
     rows = dict[str, dict[str, str]]()
     for one in measured["placed"]:
@@ -275,7 +275,7 @@ def _uncertainty_candidates() -> str:
         rows.setdefault(one["candidate"], {})[one["quantity"]] = one["word"] + beyond
     head = ("candidate", *(f"{one['title']}, {one['unit']}" for one in bands))
     cells = ((f"`{name}`", *(row.get(one["quantity"], "") for one in bands)) for name, row in rows.items())
-    return table("uncertainty", head, cells)
+    return table(file, head, cells)
 
 
 def _reference() -> str:
@@ -307,18 +307,24 @@ _MOVED = {
 
 
 def _collagen(found: dict[str, Any]) -> Any:
-    (left,) = (one for one in found["ablations"][0]["omissions"] if one["left_out"] == ["collagen_across"])
-    return {name: _only(of, _MOVED) for name, of in (("changes", left["changes"]), ("bars", found["bars"]))}
+    kept = {}
+    for case, one in found.items():
+        (left,) = (each for each in one["ablations"][0]["omissions"] if each["left_out"] == ["collagen_across"])
+        kept[case] = {"changes": _only(left["changes"], _MOVED), "bars": _only(one["bars"], _MOVED)}
+    return kept
 
 
 def _collagen_rows() -> str:
-    """The change of each statistic, and its error bar; KeyError where one is missing."""
-    measured, units = kept("collagen")["measured"], ("mm", "mm", "%", "%")
-    rows = [
-        (name, *(f"{number(measured[name][key], 2)} {unit}" for key, unit in zip(_MOVED, units, strict=True)))
-        for name in ("changes", "bars")
-    ]
-    return table("collagen", ("", *_MOVED.values()), rows)
+    """By case the change of each statistic ± its error bar; KeyError where one is missing."""
+    rows = []
+    for case, one in kept("collagen")["measured"].items():
+        found = ((one["changes"][key], one["bars"][key]) for key in _MOVED)
+        cells = (
+            f"{number(change, 2)} ± {number(bar, 2)} {unit}"
+            for (change, bar), unit in zip(found, ("mm", "mm", "%", "%"), strict=True)
+        )
+        rows.append((f"`{case}`", *cells))
+    return table("collagen", ("change ± its error bar", *_MOVED.values()), rows)
 
 
 def _omission_rows() -> str:
@@ -591,10 +597,11 @@ MEASUREMENTS = {
     "hip_flexion": Measurement("./fem compare hip_flexion", _comparison),
     "effects": Measurement("./fem effects hip_flexion --set muscle.refinements=0", _omissions),
     "collagen": Measurement(
-        "./fem effects adductor_brevis --set muscle.refinements=0 --set frames.last=100 --set frames.every=20 "
+        "./fem effects CASE --set muscle.refinements=0 --set frames.last=100 --set frames.every=20 "
         """--set candidate=[] --set expect=[] --set 'effect=[{name="neo_hooke",mu="10kPa"},{name="incompressible",bulk="10MPa"},"""
         """{name="contact",stiffness="500kPa/mm",smoothing="0.3mm"},{name="collagen_across",k1="200kPa",k2=1.5}]'""",
         _collagen,
+        ("hip_flexion", "adductor_brevis", "gluteus_medius", "gluteus_medius_anatomical", "iliacus_anatomical"),
     ),
     "study": Measurement("./fem study hip_flexion --solver fenicsx", _study),
     "fibre_ends": Measurement(
@@ -616,6 +623,9 @@ MEASUREMENTS = {
         f"./fem stress {_HARD} " + " ".join(f"--program candidates/{name}" for name in _FAST_PROGRAMS), _hard_programs
     ),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
+    "uncertainty_iliacus": Measurement(
+        "./fem uncertainty iliacus_anatomical --set muscle.tet_size=7mm --set frames.last=100", _uncertainty
+    ),
     "arms_adduction": Measurement(_TURNED.format("[0,-1,0]"), _arms_about, _TURNING),
     "arms_rotation": Measurement(_TURNED.format("[0,0,1]"), _arms_about, _TURNING),
     "standings": Measurement(
@@ -644,8 +654,10 @@ TABLES = {
     "stress_steps": _stress_steps,
     "stress_programs_verdicts": _hard_programs_rows,
     "stress_programs_left_out": _hard_programs_left_out,
-    "uncertainty_bands": _uncertainty_bands,
-    "uncertainty_candidates": _uncertainty_candidates,
+    "uncertainty_bands": partial(_uncertainty_bands, "uncertainty"),
+    "uncertainty_candidates": partial(_uncertainty_candidates, "uncertainty"),
+    "uncertainty_iliacus_bands": partial(_uncertainty_bands, "uncertainty_iliacus"),
+    "uncertainty_iliacus_candidates": partial(_uncertainty_candidates, "uncertainty_iliacus"),
     "credibility_grades": _credibility_grades,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,

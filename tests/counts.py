@@ -205,6 +205,8 @@ ADDED = {
     "own solvers as commands, load of the machine, answers first": 880,
     "laws of other people's solvers, split errors, standings": 700,
     "a data set to learn from": 460,
+    "a muscle's body beside its measurement, an indentation": 190,
+    "time limits in standings, hard cases by programs of other people, laws that cannot be split": 110,
     "anatomy out of downloads": 110,
 }
 

@@ -1,15 +1,11 @@
-"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs.
-
-The surrogate is a sparse polynomial, or, where that misses too much, a Gaussian process, if it misses less.
-"""
+"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs."""
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.assessment import chaos, gaussian_process
-from fem_reference.assessment.chaos import Chaos
+from fem_reference.assessment import gaussian_process
 from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
@@ -59,11 +55,9 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
     refused = design.refused or _not_numbers(known)
     if refused:
         return replace(band, refused=refused)
-    surrogate: Chaos | GaussianProcess | None = chaos.fit(design.points, known)
+    surrogate = gaussian_process.fit(design.points, known)
     if surrogate is None:
         return _filled(replace(band, by="runs"), defined, np.repeat(known[:1], 3, axis=0))
-    if surrogate.error > WORST:
-        surrogate = min(surrogate, gaussian_process.fit(design.points, known), key=lambda one: one.error)
     return _banded(band, design, surrogate, defined, known, surrogate(_samples(design)))
 
 
@@ -77,7 +71,7 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
     values, vectors = np.linalg.eigh(products.sum(axis=0))
     kept = values > _SHARE * max(values.sum(), 0.0) / len(values)
     scales = np.sqrt(values[kept])
-    surrogate = chaos.fit(design.points, vectors[:, kept] * scales) if kept.any() else None
+    surrogate = gaussian_process.fit(design.points, vectors[:, kept] * scales) if kept.any() else None
     every = np.isfinite(band.nominal)
     if surrogate is None:
         return _filled(replace(band, by="runs"), every, np.repeat(runs[:1], 3, axis=0))
@@ -89,7 +83,7 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
 
 
 def _banded(
-    band: Band, design: Design, surrogate: Chaos | GaussianProcess, defined: Floats, runs: Floats, predicted: Floats
+    band: Band, design: Design, surrogate: GaussianProcess, defined: Floats, runs: Floats, predicted: Floats
 ) -> Band:
     """The ``band`` by what a surrogate ``predicted`` (s, f), or where that is too bad by the ``runs`` (n, f) themselves."""
     band = replace(band, error=surrogate.error)
@@ -97,8 +91,7 @@ def _banded(
         keys = [one.key for one in design.parameters]
         first, total = (dict(zip(keys, map(float, one), strict=True)) for one in (surrogate.first, surrogate.total))
         found = np.quantile(predicted, PERCENTILES, axis=0)
-        by = "polynomial" if isinstance(surrogate, Chaos) else "process"
-        return _filled(replace(band, by=by, first=first, total=total), defined, found)
+        return _filled(replace(band, by="process", first=first, total=total), defined, found)
     missed = f"the surrogate misses {100 * surrogate.error:.0f} % of the variance at runs that it was not fitted to"
     why = f"{missed}, more than {100 * WORST:.0f} %"
     if len(runs) < FEWEST:

@@ -155,9 +155,10 @@ def of_result(found: Result) -> Beside:
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
     n = experiments.least_specimens(facts)
     met = found.word == "within"
+    coarser = [f"Cells of {size:.3g} mm give {value:.4g}." for size, value in found.finding.ladder[:-1]]
     return Beside(
         *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
-        remark=found.finding.note,
+        remark=" ".join([*coarser, *filter(None, [found.finding.note]), f"Beside: {entry.source}."]),
         is_order=entry.is_order,
     )
 

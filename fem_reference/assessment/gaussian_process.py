@@ -1,4 +1,4 @@
-"""A Gaussian process: a function of a few variables from its values in runs, where no polynomial follows it; and its sensitivities.
+"""A Gaussian process: a function of a few uniform variables from its values in runs, and its sensitivities.
 
 A linear trend, and about it a process whose covariance is the exponential of minus the square of the distance, over a length of its
 own in each variable. Lengths and noise are those of the greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for
@@ -6,7 +6,7 @@ Machine Learning, sections 2.7 and 5.4.1), with the trend and one variance of al
 sampled: those of a variable alone as Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), with others as Jansen 1999.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from fem_reference.foundations.mesh import Floats
 _GROUPS = 10  # of runs that are left out
 _LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # of variables from -1 to 1; as a share of the variance about the trend
 _START = 1.0, 1e-4
+_LEAST = 1e-24  # of the squares of the outputs: the trend alone may explain them
 _SAMPLES = 13  # as a power of 2
 
 
@@ -66,13 +67,18 @@ class GaussianProcess:
         return np.asarray(np.array(shares).T * here.shape[1] / here.var(axis=0).sum())
 
 
-def fit(points: Floats, outputs: Floats) -> GaussianProcess:
-    """The process of ``outputs`` (n, q) that vary, at ``points`` (n, d) from -1 to 1, with its error.
+def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
+    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None where the outputs do not vary.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
     >>> float(fit(points, np.sin(3 * points))(np.array([[0.5]]))[0, 0].round(3))
     0.997
     """
+    if not (np.isfinite(points).all() and np.isfinite(outputs).all()):
+        raise ValueError("finite points and outputs: a run without a value has no place in a surrogate")
+    variance = float(outputs.var(axis=0).sum())
+    if variance <= (1e-12 * np.abs(outputs).max(initial=0.0)) ** 2:
+        return None
     length, noise = _START
     whole = _fitted(points, outputs, np.log([*np.full(points.shape[1], length), noise]))
     missed = 0.0
@@ -80,8 +86,7 @@ def fit(points: Floats, outputs: Floats) -> GaussianProcess:
         out = np.arange(len(points)) % _GROUPS == i
         found = _fitted(points[~out], outputs[~out], whole.logs)
         missed += float(((found(points[out]) - outputs[out]) ** 2).sum())
-    error = missed / (len(points) * float(outputs.var(axis=0).sum()))
-    return GaussianProcess(whole.points, whole.logs, whole.trend, whole.weights, error)
+    return replace(whole, error=missed / (len(points) * variance))
 
 
 def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
@@ -94,7 +99,7 @@ def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
 def _unlikely(logs: Floats, points: Floats, outputs: Floats) -> tuple[float, Floats]:
     """The negative logarithm of the likelihood, but for a constant, and its slopes (d + 1,)."""
     trend, weights, factor = _solved(points, outputs, logs)
-    squares = float(((outputs - _terms(points) @ trend) * weights).sum())
+    squares = max(float(((outputs - _terms(points) @ trend) * weights).sum()), _LEAST * float((outputs**2).sum()))
     value = np.log(np.diag(factor[0])).sum() + len(points) / 2 * np.log(squares)
     pull = cho_solve(factor, np.eye(len(points))) - len(points) / squares * weights @ weights.T
     near = pull * _covariance(points, points, logs) / 2

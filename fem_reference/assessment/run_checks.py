@@ -153,7 +153,7 @@ def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> RunCheck
 
 def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
     """The number of positions that are not finite."""
-    lost = [int((~np.isfinite(array)).any(axis=1).sum()) for array in arrays]
+    lost = [0 if np.isfinite(array).all() else int((~np.isfinite(array)).any(axis=1).sum()) for array in arrays]
     frame = numbers[int(np.argmax(np.array(lost) > 0))] if lost else 0
     return RunCheck("positions that are not finite", float(sum(lost)), 0.0, "", frame)
 

@@ -71,9 +71,9 @@ class Band:
     bar of that answer, None where it has none. ``distance``: True of a distance from that answer, where less is always inside.
 
     ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN where there is none.
-    ``by``: the source of the percentiles, ``"polynomial"``, Gaussian ``"process"`` or ``"runs"``; ``refused``: why there is no
-    band, empty where there is one. ``first`` and ``total``: by key of the parameter the share of the variance over all frames;
-    empty where the surrogate is too bad to say (``unreliable``).
+    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: why there is no band, empty where
+    there is one. ``first`` and ``total``: by key of the parameter the share of the variance over all frames; empty where the
+    surrogate is too bad to say (``unreliable``).
     """
 
     quantity: str

@@ -33,7 +33,8 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import cube_fits, estimation, moment_arms, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
-from fem_reference.verification import experiments, runner
+from fem_reference.verification import runner
+from fem_reference.verification.lab import lab
 
 HELP = "write a page over several cases"
 TABLE = "table-5-1"
@@ -132,7 +133,9 @@ def _credibility(options: argparse.Namespace) -> int:
     """The evidence for each quantity; moment arms where the anatomy is there."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
-    entries, results = runner.entries().values(), experiments.results()
+    entries = runner.entries().values()
+    measured = runner.run([one for one in entries if one.kind == "experiment"], lab)
+    results = {one.entry.name: one for one in measured}
     rows = tuple(credibility.row(claim, entries, results, arms) for claim in credibility.claims())
     fits = (cube_fits.shipped_law(), cube_fits.collagen_law())
     found = credibility.Credibility(rows, arms, missing, fits)

@@ -1,4 +1,4 @@
-"""The verb ``run``: a case by its reference, or by another solver."""
+"""The command ``run``: solve a case by its reference, or by another solver."""
 
 import argparse
 
@@ -27,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a case, and judge its expectations of the reference; of another solver's run those that need no reference."""
+    """Solve a case, and judge its expectations of the reference; for another solver, only those that need no reference."""
     scene = scene_of(options)
     if options.explain:
         found = [str(one) for one in scene.decisions or of_case.explained(scene)] or ["all effects act"]

@@ -275,7 +275,7 @@ def moduli(acting: Iterable[Record]) -> Moduli:
 
 def _record(name: str) -> type[Record]:
     """The record in the file of the existing effect ``name``."""
-    return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, (Effect, FieldEffect))
+    return outside.only_record(importlib.import_module(f"{__name__}.{name}"), tuple(__path__), (Effect, FieldEffect))
 
 
 def make(name: str, **parameters: Any) -> "Effect":

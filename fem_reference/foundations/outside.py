@@ -1,7 +1,7 @@
 """Effects of users: files outside the package, in the folders that the setting FEM_REFERENCE_EFFECTS lists."""
 
 import os
-from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -17,7 +17,8 @@ def folders() -> list[str]:
     return [str(Path(folder).absolute()) for folder in os.environ.get(SETTING, "").split(os.pathsep) if folder]
 
 
-def only_record(module: ModuleType, places: Sequence[str], kinds: tuple[type[Record], ...]) -> type[Record]:
+@cache
+def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[Record], ...]) -> type[Record]:
     """The one record of ``kinds`` that a ``module`` defines, whose file stands in one of the ``places`` and in no other."""
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]

@@ -26,11 +26,6 @@ class Boxes:
         return np.asarray((self.high - self.low).max(axis=1, keepdims=True) + rounding)
 
     @cached_property
-    def hull(self) -> tuple[Floats, Floats]:
-        """The box (3,) [mm] around all of them."""
-        return self.low.min(axis=1), self.high.max(axis=1)
-
-    @cached_property
     def corners(self) -> tuple[Floats, Floats]:
         """The box (3, 1) [mm] around all low corners."""
         return self.low.min(axis=1, keepdims=True), self.low.max(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Curves from few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
+"""Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
 are misprinted: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and the matrix (3.2) is that of the uniform spline, not of
@@ -18,13 +18,13 @@ Curve = Callable[[Floats], Floats]
 
 
 def knots(points: Floats, exponent: float = 1.0) -> Floats:
-    """Parameters (n,) of ``points`` (n, d), from 0 to 1, whose differences grow with the distance to the power of ``exponent``:
+    """Parameters (n,) of ``points`` (n, d), from 0 to 1, whose differences are proportional to distance to the ``exponent``:
     0 uniform, 0.5 centripetal, 1 chordal.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():
         got = f"{len(points)} points, {int((steps == 0).sum())} repeated"
-        raise InputError("curve", got, "two points or more, all apart")
+        raise InputError("curve", got, "two points or more, none repeated")
     ends = np.concatenate([[0.0], np.cumsum(steps**exponent)])
     return np.asarray(ends / ends[-1])
 
@@ -36,23 +36,24 @@ def constant(points: Floats) -> Curve:
 
 
 def linear(points: Floats) -> Curve:
-    """Straight between ``points`` (n, d) (report 3.1)."""
+    """Straight lines between consecutive ``points`` (n, d) (report 3.1)."""
     found: Curve = scipy.interpolate.interp1d(knots(points), points, axis=0)
     return found
 
 
 def bezier(points: Floats) -> Curve:
-    """The Bezier curve of degree n - 1 whose control points are ``points`` (n, d); it passes the first and the last (3.1)."""
+    """The Bezier curve of degree n - 1 with control points ``points`` (n, d); it passes through the first and the last (3.1)."""
     knots(points)
     found: Curve = scipy.interpolate.BPoly(points[:, None], [0.0, 1.0])
     return found
 
 
 def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
-    """The spline of Catmull and Rom through ``points`` (n, d): 0 uniform (3.2), 0.5 centripetal, 1 chordal.
+    """The Catmull-Rom spline through ``points`` (n, d). ``exponent``: 0 uniform (3.2), 0.5 centripetal, 1 chordal.
 
     Its tangents are those of the parabola through a point and its two neighbours (Barry and Goldman 1988,
-    doi 10.1145/378456.378511). At an end the point itself stands for the missing neighbour (report 3.3): half the chord's slope.
+    doi 10.1145/378456.378511). At an end the end point itself replaces the missing neighbour (report 3.3), which gives half the
+    slope of the chord.
     """
     times = knots(points, exponent)
     slopes = np.diff(points, axis=0) / np.diff(times)[:, None]
@@ -65,9 +66,10 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
 
 
 def fourier(points: Floats) -> Curve:
-    """The discrete Fourier series of ``points`` (n, d), which count as equidistant and periodic beside their chord (3.4, 3.5).
+    """The discrete Fourier series of ``points`` (n, d), taken as equidistant, and as periodic without their chord (3.4, 3.5).
 
-    The straight line between both ends is taken off first and the rest continued as an odd function, so that the ends are met.
+    The chord, the straight line between both ends, is subtracted first and the rest extended as an odd function, so that the
+    curve passes through the ends.
     """
     count = len(knots(points)) - 1
     orders, at = np.arange(1, count), np.linspace(0, 1, count + 1)
@@ -79,7 +81,7 @@ def fourier(points: Floats) -> Curve:
 def radial(points: Floats, shape: float = 3.0) -> Curve:
     """Gaussian radial basis functions with a linear polynomial through ``points`` (n, d) by chord length (3.6, 3.10).
 
-    ``shape``: over the length of the curve, the inverse width of a Gaussian.
+    ``shape``: the length of the curve over the width of a Gaussian.
     """
     times = knots(points)
     found = scipy.interpolate.RBFInterpolator(times[:, None], points, kernel="gaussian", epsilon=shape, degree=1)

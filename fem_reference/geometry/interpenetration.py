@@ -1,4 +1,4 @@
-"""The depth to which two closed surfaces are in each other, from their triangles alone."""
+"""The depth to which two closed surfaces penetrate each other, from their triangles alone."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 
-# Sample points of a triangle that crosses the other surface: its corners, and those of a grid between them.
+# Sample points of a triangle that crosses the other surface: its corners, and a regular grid between them.
 _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
-    """The depth [mm] to which two closed surfaces are in each other, and its place (3,): that of the deepest vertex of either in
+    """The depth [mm] to which two closed surfaces penetrate each other, and its place (3,): that of the deepest vertex of either in
     the other, or of the deepest of 28 sample points of a triangle that crosses the other; 0 where they are apart.
     """
     pairs = crossings(one, other)

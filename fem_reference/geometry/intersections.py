@@ -24,6 +24,8 @@ def self_crossings(surface: Surface) -> Ints:
     if not len(some):
         return np.zeros((0, 2), np.int64)
     _, found, _ = predicates.find_self_intersections(np.array(surface.points), surface.triangles[some])
+    if not len(found):
+        return np.zeros((0, 2), np.int64)
     pairs = some[found]
     first, second = pairs.T
     hit = np.zeros(len(pairs), bool)
@@ -35,8 +37,8 @@ def self_crossings(surface: Surface) -> Ints:
 
 def crossings(one: Surface, other: Surface) -> Ints:
     """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly, by predicates of Shewchuk 1997."""
-    found = near_pairs(other, one)  # its grid is over the second
-    near = touching(boxes_of(one), boxes_of(other)) if found is None else tuple(map(np.unique, found.T[::-1]))
+    found = near_pairs(one, other)
+    near = touching(boxes_of(one), boxes_of(other)) if found is None else tuple(map(np.unique, found.T))
     if not all(map(len, near)):
         return np.zeros((0, 2), np.int64)
     points = [

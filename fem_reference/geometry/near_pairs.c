@@ -17,7 +17,12 @@ typedef struct { /* with the first and last cells of a grid that it touches, and
     double low[3], high[3], size;
     int first[3], last[3];
 } Box;
-typedef struct { double low[3], edge; int size[3]; int64_t *starts, *inside; } Grid;
+typedef struct { /* with the count boxes that are sorted into its cells, and the box around them */
+    double low[3], edge;
+    int size[3];
+    int64_t count, *starts, *inside;
+    Box *boxes, hull;
+} Grid;
 typedef struct { /* triangles (count, 3) of points (, 3) */
     int64_t count;
     const double *points;
@@ -72,21 +77,21 @@ static void place(const Grid *grid, Box *box)
 }
 
 /* At most about four cells a box, and no smaller than boxes are on average. */
-static Grid grid_over(const Box *boxes, int64_t count, Box *hull)
+static void measure(Grid *grid)
 {
     double extent = 0, volume = 1;
-    *hull = boxes[0];
-    for (int64_t t = 0; t < count; t++) {
-        widen(hull, boxes + t);
-        extent += boxes[t].size / (double)count;
+    grid->hull = grid->boxes[0];
+    for (int64_t t = 0; t < grid->count; t++) {
+        widen(&grid->hull, grid->boxes + t);
+        extent += grid->boxes[t].size / (double)grid->count;
     }
-    Grid grid = {{hull->low[0], hull->low[1], hull->low[2]}, extent, {1, 1, 1}, NULL, NULL};
     for (int i = 0; i < 3; i++)
-        volume *= hull->high[i] - hull->low[i] + extent;
-    grid.edge = MORE(extent, cbrt(volume / (4 * (double)count)));
-    for (int i = 0; i < 3 && grid.edge > 0; i++)
-        grid.size[i] = (int)LESS(1000, 1 + (hull->high[i] - hull->low[i]) / grid.edge);
-    return grid;
+        volume *= grid->hull.high[i] - grid->hull.low[i] + extent;
+    grid->edge = MORE(extent, cbrt(volume / (4 * (double)grid->count)));
+    for (int i = 0; i < 3; i++) {
+        grid->low[i] = grid->hull.low[i];
+        grid->size[i] = grid->edge > 0 ? (int)LESS(1000, 1 + (grid->hull.high[i] - grid->low[i]) / grid->edge) : 1;
+    }
 }
 
 static void cross(const double *a, const double *b, double *found)
@@ -193,27 +198,51 @@ static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t
 #define EVERY_CELL(box)                                                                       \
     for (int x = (box).first[0]; x <= (box).last[0]; x++)                                    \
         for (int y = (box).first[1]; y <= (box).last[1]; y++)                                \
-            for (int64_t z = (box).first[2], at = ((int64_t)x * grid.size[1] + y) * grid.size[2] + z; z <= (box).last[2]; z++, at++)
+            for (int64_t z = (box).first[2], at = ((int64_t)x * grid->size[1] + y) * grid->size[2] + z; z <= (box).last[2]; z++, at++)
 
 /* Sort boxes into the cells of the grid; 0 without memory. */
-static int fill(Grid *filled, Box *boxes, int64_t count)
+static int fill(Grid *grid)
 {
-    Grid grid = *filled;
-    int64_t cells = (int64_t)grid.size[0] * grid.size[1] * grid.size[2];
-    grid.starts = calloc((size_t)cells + 2, sizeof *grid.starts);
-    for (int64_t t = 0; grid.starts && t < count; t++) {
-        place(&grid, boxes + t);
-        EVERY_CELL(boxes[t])
-            grid.starts[at + 2]++;
+    int64_t cells = (int64_t)grid->size[0] * grid->size[1] * grid->size[2];
+    grid->starts = calloc((size_t)cells + 2, sizeof *grid->starts);
+    for (int64_t t = 0; grid->starts && t < grid->count; t++) {
+        place(grid, grid->boxes + t);
+        EVERY_CELL(grid->boxes[t])
+            grid->starts[at + 2]++;
     }
-    for (int64_t c = 2; grid.starts && c < cells + 2; c++)
-        grid.starts[c] += grid.starts[c - 1];
-    grid.inside = grid.starts ? malloc((size_t)(grid.starts[cells + 1] + 1) * sizeof *grid.inside) : NULL;
-    for (int64_t t = 0; grid.inside && t < count; t++)
-        EVERY_CELL(boxes[t])
-            grid.inside[grid.starts[at + 1]++] = t;
-    *filled = grid;
-    return grid.inside != NULL;
+    for (int64_t c = 2; grid->starts && c < cells + 2; c++)
+        grid->starts[c] += grid->starts[c - 1];
+    grid->inside = grid->starts ? malloc((size_t)(grid->starts[cells + 1] + 1) * sizeof *grid->inside) : NULL;
+    for (int64_t t = 0; grid->inside && t < grid->count; t++)
+        EVERY_CELL(grid->boxes[t])
+            grid->inside[grid->starts[at + 1]++] = t;
+    return grid->inside != NULL;
+}
+
+void forget(Grid *grid)
+{
+    free(grid->starts);
+    free(grid->inside);
+    free(grid->boxes);
+    free(grid);
+}
+
+/* The triangles of a surface that has some, sorted by their places; NULL without memory. To be forgotten. */
+Grid *sorted(Surface surface)
+{
+    Grid *grid = calloc(1, sizeof *grid);
+    if (!grid)
+        return NULL;
+    grid->count = surface.count;
+    grid->boxes = malloc((size_t)surface.count * sizeof *grid->boxes);
+    for (int64_t t = 0; grid->boxes && t < surface.count; t++)
+        grid->boxes[t] = box_of(&surface, t);
+    if (grid->boxes)
+        measure(grid);
+    if (grid->boxes && fill(grid))
+        return grid;
+    forget(grid);
+    return NULL;
 }
 
 /* Add the pair s and t where it may meet; each once, in the cell of the greatest low corner of its boxes. */
@@ -231,48 +260,38 @@ static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *i
     found->count++;
 }
 
-static void add_of_one(Found *found, Grid grid, const Box *boxes)
+static void add_of_one(Found *found, const Grid *grid)
 {
-    Box whole = {{0}, {0}, 0, {0}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
+    Box whole = {{0}, {0}, 0, {0}, {grid->size[0] - 1, grid->size[1] - 1, grid->size[2] - 1}};
     EVERY_CELL(whole)
-        for (int64_t i = grid.starts[at]; i < grid.starts[at + 1]; i++)
-            for (int64_t k = i + 1; k < grid.starts[at + 1]; k++) {
-                int64_t s = grid.inside[i], t = grid.inside[k];
-                add(found, s, boxes + s, t, boxes + t, (int[]){x, y, (int)z});
+        for (int64_t i = grid->starts[at]; i < grid->starts[at + 1]; i++)
+            for (int64_t k = i + 1; k < grid->starts[at + 1]; k++) {
+                int64_t s = grid->inside[i], t = grid->inside[k];
+                add(found, s, grid->boxes + s, t, grid->boxes + t, (int[]){x, y, (int)z});
             }
 }
 
-static void add_of_two(Found *found, Grid grid, const Box *boxes, const Box *hull)
+static void add_of_two(Found *found, const Grid *grid)
 {
     for (int64_t s = 0; s < found->one->count; s++) {
         Box box = box_of(found->one, s);
-        if (apart(&box, hull))
+        if (apart(&box, &grid->hull))
             continue;
-        place(&grid, &box);
+        place(grid, &box);
         EVERY_CELL(box)
-            for (int64_t i = grid.starts[at]; i < grid.starts[at + 1]; i++)
-                add(found, s, &box, grid.inside[i], boxes + grid.inside[i], (int[]){x, y, (int)z});
+            for (int64_t i = grid->starts[at]; i < grid->starts[at + 1]; i++)
+                add(found, s, &box, grid->inside[i], grid->boxes + grid->inside[i], (int[]){x, y, (int)z});
     }
 }
 
-/* Fill up to room pairs (room, 2) of triangles of two surfaces, or of one with itself, each pair once. Their number, which may be
-   more than room; -1 without memory. */
-int64_t near_pairs(Surface one, Surface other, int itself, int64_t room, int64_t *pairs)
+/* Fill up to room pairs (room, 2) of triangles of two surfaces, or of one with itself, each pair once; grid is the other, sorted.
+   Their number, which may be more than room. */
+int64_t near_pairs(Surface one, Surface other, const Grid *grid, int itself, int64_t room, int64_t *pairs)
 {
     Found found = {&one, &other, room, 0, pairs};
-    Box hull, *boxes = other.count > 0 ? malloc((size_t)other.count * sizeof *boxes) : NULL;
-    if (!boxes)
-        return -1;
-    for (int64_t t = 0; t < other.count; t++)
-        boxes[t] = box_of(&other, t);
-    Grid grid = grid_over(boxes, other.count, &hull);
-    int filled = fill(&grid, boxes, other.count);
-    if (filled && itself)
-        add_of_one(&found, grid, boxes);
-    else if (filled)
-        add_of_two(&found, grid, boxes, &hull);
-    free(boxes);
-    free(grid.starts);
-    free(grid.inside);
-    return filled ? found.count : -1;
+    if (itself)
+        add_of_one(&found, grid);
+    else
+        add_of_two(&found, grid);
+    return found.count;
 }

@@ -1,7 +1,7 @@
 """Pairs of triangles that may intersect, found by compiled loops (``near_pairs.c``)."""
 
 import ctypes
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -24,30 +24,51 @@ class _Triangles(ctypes.Structure):
         return cls(len(surface.triangles), surface.points.ctypes.data, surface.triangles.ctypes.data)
 
 
+class _Sorted:
+    """The triangles of a ``surface`` that has some, sorted by their places."""
+
+    def __init__(self, surface: Surface, code: ctypes.CDLL) -> None:
+        self.code, self.grid = code, code.sorted(_Triangles.of(surface))
+        if not self.grid:
+            raise MemoryError("pairs of triangles")
+
+    def __del__(self) -> None:
+        if self.grid:
+            self.code.forget(self.grid)
+
+
+# Bones are met at many frames, in a frame of their own.
+_kept = lru_cache(maxsize=8)(_Sorted)
+
+
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Pairs (k, 2) of triangles of two surfaces that may intersect or touch, or of one with itself, each pair
     once: all that do, and few that do not. Of one surface those that share an edge, or touch at a common corner only, are left
-    out. None where no compiler is, or a point is not finite.
+    out. None where no compiler is, or a point is not finite. Fast where ``other`` is the same surface again.
     """
     code = _code()
     if code is None or not all(np.isfinite(surface.points).all() for surface in (one, other)):
         return None
-    found, pairs = (_ROOM if len(one.triangles) and len(other.triangles) else 0), np.zeros((0, 2), np.int64)
+    pairs = np.zeros((0, 2), np.int64)
+    if not (len(one.triangles) and len(other.triangles)):
+        return pairs
+    places, found = (_Sorted if one is other else _kept)(other, code), _ROOM
     while found > len(pairs):
         pairs = np.empty((found, 2), np.int64)
-        found = code(_Triangles.of(one), _Triangles.of(other), one is other, len(pairs), pairs.ctypes.data)
-        if found < 0:
-            raise MemoryError("pairs of triangles")
+        triangles = _Triangles.of(one), _Triangles.of(other)
+        found = code.near_pairs(*triangles, places.grid, one is other, len(pairs), pairs.ctypes.data)
     return pairs[:found]
 
 
 @cache
-def _code() -> "ctypes._NamedFuncPointer | None":
+def _code() -> ctypes.CDLL | None:
     folder = platformdirs.user_cache_path("fem_reference") / "compiled"
     try:
-        code = native.library(Path(__file__).with_suffix(".c"), _FLAGS, folder).near_pairs
+        code = native.library(Path(__file__).with_suffix(".c"), _FLAGS, folder)
     except (OSError, RuntimeError):
         return None
-    code.argtypes = [_Triangles, _Triangles, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p]
-    code.restype = ctypes.c_int64
+    code.sorted.argtypes, code.sorted.restype = [_Triangles], ctypes.c_void_p
+    code.forget.argtypes, code.forget.restype = [ctypes.c_void_p], None
+    code.near_pairs.argtypes = [_Triangles, _Triangles, ctypes.c_void_p, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p]
+    code.near_pairs.restype = ctypes.c_int64
     return code

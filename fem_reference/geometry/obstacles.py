@@ -44,12 +44,13 @@ class Quadric:
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
         """Values (n,) of the sum of (x / a)^2, less 1, and gradients (n, 3)."""
-        own = self._own(points)
-        return np.sum((own / self.radii) ** 2, axis=1) - 1, 2 * (own / self.radii**2) @ self.pose[:3, :3].T
+        own = self._own(points) / self.radii
+        return np.vecdot(own, own) - 1, 2 * (own / self.radii) @ self.pose[:3, :3].T
 
     def bending(self, _: Floats, directions: Floats) -> Floats:
         """The second derivative (n,) along ``directions`` (n, 3), the same everywhere."""
-        return np.asarray(2 * np.sum((directions @ self.pose[:3, :3] / self.radii) ** 2, axis=1))
+        own = directions @ self.pose[:3, :3] / self.radii
+        return np.asarray(2 * np.vecdot(own, own))
 
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface along its normal, from deep inside first away from the axis."""
@@ -61,7 +62,7 @@ class Quadric:
         inside = size < 1
         for _ in range(3):
             value, slope = self.level(moved)
-            moved = moved - (inside * value / np.maximum(np.sum(slope**2, axis=1), 1e-12))[:, None] * slope
+            moved = moved - (inside * value / np.maximum(np.vecdot(slope, slope), 1e-12))[:, None] * slope
         return np.asarray(moved)
 
     def deepest(self, begins: Floats, ends: Floats) -> Floats:
@@ -97,14 +98,14 @@ class Ring:
     def level(self, points: Floats) -> tuple[Floats, Floats]:
         """Values (n,) of the squared distance from the circle less that of the surface, and gradients (n, 3)."""
         across = points - self._nearest(points)
-        return np.sum(across**2, axis=1) - self.tube**2, 2 * across
+        return np.vecdot(across, across) - self.tube**2, 2 * across
 
     def bending(self, points: Floats, directions: Floats) -> Floats:
         """The second derivative (n,) at ``points`` (n, 3) along ``directions`` (n, 3)."""
         outward, away = self._outward(points)
         axis = self.pose[:3, 2]
-        out, up = np.sum(directions * outward, axis=1), directions @ axis
-        around = np.sum(directions**2, axis=1) - out**2 - up**2
+        out, up = np.vecdot(directions, outward), directions @ axis
+        around = np.vecdot(directions, directions) - out**2 - up**2
         return np.asarray(2 * (out**2 + up**2 + around * (1 - self.radius / away)))
 
     def pushed(self, points: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
@@ -116,9 +116,14 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def _in_box(body: Surface, points: Floats) -> Ints:
-    """The ``points`` (k,) of n within the box around a ``body``."""
-    low, high = boxes_of(body).hull
+    """The ``points`` (k,) of n within the box around the points of a ``body``."""
+    low, high = _box(body)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+
+
+@lru_cache(maxsize=4)
+def _box(body: Surface) -> tuple[Floats, Floats]:
+    return body.points.min(axis=0), body.points.max(axis=0)
 
 
 def _of_surface(
@@ -166,8 +171,11 @@ def _bone_tips(bone: Surface) -> Ints:
 @lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
     """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
-    parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
-    return np.unique(parts, return_index=True)[1]
+    corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
+    parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
+    found = np.zeros(parts.max() + 1, np.int64)
+    found[parts[::-1]] = np.arange(len(parts))[::-1]  # the last to be set: the first of each
+    return np.sort(found)
 
 
 class Shared(NamedTuple):
@@ -177,7 +185,7 @@ class Shared(NamedTuple):
     deepest: float
 
 
-def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body: Floats) -> Shared:
+def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
@@ -185,13 +193,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body
     times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
-    [mm] of points (n, 3) to it, negative inside, and by points ``body`` (k, 3) [mm] on all its sides: where all are inside the
-    surface, the whole body counts. The volume is 0 where no counted triangle enters the body, and the body does not reach into
-    the surface up to its middle. It is NaN where the surface has blown up beyond a cubic metre.
+    [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
+    [mm] on all its sides: where all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
+    enters the body, and the body does not reach into the surface up to its middle. It is NaN where the surface has blown up
+    beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
-    if extent.max() == 0 or not (within.any() or _touches(surface, counts, distance)):
+    if extent.max() == 0 or not (within.any() or _touches(surface, counts, gaps, distance)):
         return Shared(0.0, 0.0)
     if np.prod(extent / _FIRST_EDGE) > _TOO_MANY:
         return Shared(np.nan, 0.0)
@@ -219,10 +228,10 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
     return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
-def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
+def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
     """True where a counted triangle enters the body; tested at its vertices, and near the body at ever smaller parts."""
     triangles = surface.triangles[counts]
-    corners, away = surface.points[triangles], distance(surface.points)[triangles]
+    corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True

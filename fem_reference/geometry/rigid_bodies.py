@@ -47,6 +47,10 @@ class Obstacle(Protocol):
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
         ...
 
+    def distances(self, points: Floats) -> Floats:
+        """The distance (n,) [mm] of :meth:`sample` alone."""
+        ...
+
 
 class Exact:
     """Base of bodies of closed form: their distance is exact everywhere."""
@@ -56,6 +60,10 @@ class Exact:
     def clearance(self: Obstacle, within: float) -> Callable[[Floats], Floats]:
         """The distance of points minus ``within`` [mm]."""
         return lambda points: self.sample(points).distance - within
+
+    def distances(self: Obstacle, points: Floats) -> Floats:
+        """The distance (n,) [mm] of ``points`` (n, 3)."""
+        return self.sample(points).distance
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ Tricubic B-splines interpolate between the nodes, so that gradient and curvature
 
 import logging
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ import scipy
 
 from fem_reference.foundations.mesh import (
     Floats,
+    Ints,
     Surface,
     check_closed,
     check_finite,
@@ -41,6 +43,8 @@ _STRIDE = 4
 # Random points around the surface at which the error is sampled, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
+# So many points are sampled at a time.
+_AT_ONCE = 10_000
 # Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
@@ -88,23 +92,41 @@ class Grid:
         """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""
         found = Sampled(np.full(len(points), FAR), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3)))
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
-        at = (points - self.origin) / self.spacing
-        inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
-        for chunk in np.array_split(inside, 1 + len(inside) // 10_000):
-            for whole, part in zip(found, self._interpolate(at[chunk]), strict=True):
+        for chunk, at in self._inside(points):
+            for whole, part in zip(found, self._interpolate(at), strict=True):
                 whole[chunk] = part
         return found
 
-    def _interpolate(self, at: Floats) -> Sampled:
-        """The values at places (n, 3) inside the grid, in cells from its origin."""
+    def distances(self, points: Floats) -> Floats:
+        """The distance (n,) of :meth:`sample` alone, in half its time."""
+        found = np.where(np.isfinite(points).all(axis=1), FAR, np.nan)
+        for chunk, at in self._inside(points):
+            found[chunk] = self._values(at, 1).ravel()
+        return found
+
+    def _inside(self, points: Floats) -> Iterator[tuple[Ints, Floats]]:
+        """Chunks of the indices of ``points`` (n, 3) inside the grid, with their places in cells from its origin."""
+        at = (points - self.origin) / self.spacing
+        inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
+        for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
+            yield chunk, at[chunk]
+
+    def _values(self, at: Floats, orders: int) -> Floats:
+        """The value and the derivatives below so many ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at places
+        (n, 3) in cells from the origin.
+        """
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
-        x, y, z = (_weights(at[:, axis] - cell[:, axis]) for axis in range(3))
+        x, y, z = (_weights(at[:, axis] - cell[:, axis], orders) for axis in range(3))
         first = np.ravel_multi_index(tuple(cell.T - 1), shape)
         reach = np.ravel_multi_index(tuple(np.indices((4, 4, 4)).reshape(3, -1)), shape)
         around = self.coefficients.ravel()[first[:, None] + reach].reshape(-1, 4, 4, 4)
-        values = x @ (y[:, None] @ (around @ z.transpose(0, 2, 1)[:, None])).reshape(-1, 4, 9)
-        values = values.reshape(-1, 3, 3, 3)  # by the order of the derivative along x, y and z
+        values = x @ (y[:, None] @ (around @ z.transpose(0, 2, 1)[:, None])).reshape(-1, 4, orders**2)
+        return np.asarray(values.reshape(-1, orders, orders, orders))
+
+    def _interpolate(self, at: Floats) -> Sampled:
+        """Distance and its two derivatives at places (n, 3) in cells from the origin."""
+        values = self._values(at, 3)
         curvature = np.empty((len(at), 3, 3))
         for i, j in np.ndindex(3, 3):
             curvature[:, i, j] = values[:, *(np.eye(3, dtype=int)[i] + np.eye(3, dtype=int)[j])]
@@ -112,13 +134,16 @@ class Grid:
         return Sampled(values[:, 0, 0, 0], gradient / self.spacing, curvature / self.spacing**2)
 
 
-def _weights(within: Floats) -> Floats:
-    """Value and two derivatives of the four B-splines of a cell at ``within`` (n,), from 0 to 1 across it: (n, 3, 4)."""
+def _weights(within: Floats, orders: int) -> Floats:
+    """Value and derivatives below so many ``orders`` of the four B-splines of a cell at ``within`` (n,), from 0 to 1 across it:
+    (n, orders, 4).
+    """
     one, none = np.ones_like(within), np.zeros_like(within)
-    powers = np.stack([one, within, within**2, within**3], axis=1)
-    slopes = np.stack([none, one, 2 * within, 3 * within**2], axis=1)
-    bends = np.stack([none, none, 2 * one, 6 * within], axis=1)
-    return np.stack([powers, slopes, bends], axis=1) @ _SPLINES.T
+    found = [np.stack([one, within, within**2, within**3], axis=1)]
+    if orders > 1:
+        found.append(np.stack([none, one, 2 * within, 3 * within**2], axis=1))
+        found.append(np.stack([none, none, 2 * one, 6 * within], axis=1))
+    return np.stack(found, axis=1) @ _SPLINES.T
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:

@@ -118,7 +118,7 @@ class _Pieces:
             for i, straight in ((0, points[0] - one), (-1, other - points[-1])):
                 normal = _units(obstacle.level(points[i])[1])
                 binormal = np.cross(normal, tangents[i])
-                found += [np.sum(straight * normal, axis=1), np.sum(straight * binormal, axis=1)]
+                found += [np.vecdot(straight, normal), np.vecdot(straight, binormal)]
         return np.stack(found, axis=1)
 
     def rows(self, which: Ints) -> "_Pieces":
@@ -140,7 +140,7 @@ class _Pieces:
             point = self.points[i] + ahead[:, None] * self.along[i] + aside[:, None] * binormal
             for _ in range(3):  # back to the surface
                 value, slope = obstacle.level(point)
-                point = point - (value / np.sum(slope**2, axis=1))[:, None] * slope
+                point = point - (value / np.vecdot(slope, slope))[:, None] * slope
             direction = np.cos(turn)[:, None] * self.along[i] + np.sin(turn)[:, None] * binormal
             points.append(point)
             along.append(_tangent(direction, obstacle.level(point)[1]))
@@ -217,10 +217,8 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
     """The geodesics without kinks, by Newton's method, and True (n,) where there are none left."""
     near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
-    todo = np.arange(len(near))
+    todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
     for _ in range(_ITERATIONS):
-        part = pieces.rows(todo)
-        kinks = part.kinks()
         left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # also what is not a number
         if not left.any():
             return pieces, np.ones(len(near), dtype=bool)
@@ -231,20 +229,23 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
         slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # which no change mends
         change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
         change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
-        part = _better(part, change, np.linalg.norm(kinks, axis=1))
+        part, kinks = _better(part, change, np.linalg.norm(kinks, axis=1))
         pieces.points[:, todo], pieces.along[:, todo], pieces.sizes[:, todo] = part.points, part.along, part.sizes
     return pieces, ~np.isin(np.arange(len(near)), todo)
 
 
-def _better(pieces: _Pieces, change: Floats, kinks: Floats) -> _Pieces:
-    """The geodesics after a ``change`` (n, 4 m) that is halved where ``kinks`` (n,) [mm] would not become smaller."""
+def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, Floats]:
+    """The geodesics after a ``change`` (n, 4 m) that is halved where kinks, of size ``before`` (n,) [mm], would not become smaller;
+    and their kinks.
+    """
     for _ in range(5):
         tried = pieces.moved(change)
-        worse = np.linalg.norm(tried.kinks(), axis=1) > kinks
+        kinks = tried.kinks()
+        worse = np.linalg.norm(kinks, axis=1) > before
         if not worse.any():
             break
         change = np.where(worse[:, None], change / 2, change)
-    return tried
+    return tried, kinks
 
 
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
@@ -253,7 +254,7 @@ def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Flo
 
     def bent(place: Floats, direction: Floats) -> Floats:
         slope = obstacle.level(place)[1]
-        share = obstacle.bending(place, direction) / np.sum(slope**2, axis=1)
+        share = obstacle.bending(place, direction) / np.vecdot(slope, slope)
         return np.asarray(-share[:, None] * slope)
 
     for _ in range(_STEPS):
@@ -264,15 +265,15 @@ def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Flo
         d = bent(x + step * t + step**2 / 2 * b, t + step * c)
         place, tangent = x + step * t + step**2 / 6 * (a + b + c), t + step / 6 * (a + 2 * b + 2 * c + d)
         value, slope = obstacle.level(place)
-        path.append((place - (value / np.sum(slope**2, axis=1))[:, None] * slope, _tangent(tangent, slope)))
+        path.append((place - (value / np.vecdot(slope, slope))[:, None] * slope, _tangent(tangent, slope)))
     return np.array([x for x, _ in path]), np.array([t for _, t in path])
 
 
 def _tangent(directions: Floats, slopes: Floats) -> Floats:
     """Unit vectors (n, 3) along the ``directions`` but for their parts along the ``slopes``."""
     normals = _units(slopes)
-    return _units(directions - np.sum(directions * normals, axis=1)[:, None] * normals)
+    return _units(directions - np.vecdot(directions, normals)[:, None] * normals)
 
 
 def _units(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1)[..., None])
+    return np.asarray(vectors / np.sqrt(np.vecdot(vectors, vectors))[..., None])

@@ -260,7 +260,8 @@ def at_rest(run: Run) -> Run:
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
-    return Run("rest", "rest", run.outcome, run.numbers, run.surface, still, run.fibres, fibres)
+    parts = run.surface, still, run.fibres, fibres
+    return Run("rest", "rest", run.outcome, run.numbers, *parts, has_surface=run.has_surface)
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:

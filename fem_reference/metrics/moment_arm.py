@@ -1,9 +1,9 @@
-"""Moment arms of the fibres about the joint that turns, by tendon excursion: ``-dl/dtheta`` (An et al. 1984).
+"""Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
-``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive where the muscle shortens with a
-growing angle, as in OpenSim. The slope is that of the parabola through three frames, with an error of second order in their
-angles. A frame in which the joint rests has the slope of the frames nearest in time. Where more than one bone moves, lengths do
-not depend on one angle alone, and the arm is NaN. A case without a joint has no arms.
+``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive where the muscle shortens as
+the angle grows, as in OpenSim. The slope is that of the parabola through three frames, with an error of second order in their
+angles. A frame at which the joint is at rest takes the slope of the frames nearest in time. Where more than one bone moves,
+lengths do not depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,14 +27,14 @@ STATISTICS = {
     "greatest": Statistic("mm", _TITLE, "greatest of a fibre", local=True, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Angles [rad] and entries of poses that are nearer than this are the same.
+# Angles [rad], and entries of pose matrices, count as equal if they differ by no more than this.
 _SAME = 1e-9
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``r - r_reference`` [mm]: signed ``mean``, ``least`` and ``greatest``, ``rms``, and greatest
-    magnitude ``max``.
+    """Statistics of the deviation ``r - r_reference`` [mm] over the fibres: signed ``mean``, ``least`` and ``greatest``, ``rms``,
+    and greatest magnitude ``max``.
     """
     if not context.joints or len(run.numbers) < 2:
         return ()
@@ -47,7 +47,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequence[int]) -> Floats:
-    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at frame ``numbers``; NaN where no joint turns alone."""
+    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at the frames ``numbers``; NaN where no joint rotates alone."""
     which, arms = turning(context.joints, context, numbers), np.full(lengths.shape, np.nan)
     for frame, i in enumerate(which):
         if i >= 0:
@@ -58,7 +58,7 @@ def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequen
 
 
 def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Sequence[int]) -> Ints:
-    """The index (f,) of the joint that turns about each frame while all bones but its own rest; -1 where there is none."""
+    """The index (f,) of the joint that rotates around the time of each frame while all other bones are at rest; -1 for none."""
     poses = np.array([[bone.pose(number) for bone in context.bones] for number in numbers])
     names, which = [bone.name for bone in context.bones], np.full(len(numbers), -1)
     for i, joint in enumerate(joints):
@@ -72,7 +72,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """A ``frame`` and up to two others nearest in time, at three different angles on a part of the path that turns one way."""
+    """A ``frame`` and the up to two others nearest in time, all at different angles, on a part of the path that turns one way."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:
@@ -81,7 +81,7 @@ def _near(angles: Floats, frame: int) -> list[int]:
 
 
 def _onward(angles: Floats, frames: range, start: int) -> Iterator[int]:
-    """Up to two of ``frames`` whose angles go on from that at ``start`` in one direction."""
+    """Up to two of ``frames`` whose angles continue from that at ``start`` in one direction."""
     direction, last, found = 0.0, start, 0
     for frame in frames:
         step = float(angles[frame] - angles[last])

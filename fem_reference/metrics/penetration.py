@@ -89,8 +89,9 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
     fine = Surface(exempt.corners.carried @ surface.points, exempt.corners.at)
     for bone in context.bones:
         there = apply(bone.pose(number), bone.surface.points)
-        inside = shared(fine, exempt.felt, partial(bone.distances, number), there)
-        found = _deepest(exempt, fine, bone, number, allowed[bone.name])
+        gaps = bone.distances(number, fine.points)
+        inside = shared(fine, exempt.felt, gaps, partial(bone.distances, number), there)
+        found = _deepest(exempt, fine, bone.name, gaps, allowed[bone.name])
         if inside.deepest > _MIDDLE * bone.shape.half_thickness:
             found = max(found, _Worst(inside.deepest, f"around the middle of {bone.name}"), key=_value)
         deepest = max(deepest, found, key=_value)
@@ -99,10 +100,9 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
     return [deepest, _Worst(volume, largest.where)]
 
 
-def _deepest(exempt: Exemption, fine: Surface, bone: Bone, number: int, allowed: Floats) -> _Worst:
-    """Depth beyond what is ``allowed`` (k,) at the points (k,) of a surface in pieces."""
+def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed: Floats) -> _Worst:
+    """Depth beyond what is ``allowed`` (k,) at the points of a surface in pieces, with their ``gaps`` (k,) to a bone."""
     corners, reach = exempt.corners, exempt.reach
-    gaps = bone.distances(number, fine.points)
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])
     follows = (np.abs(gaps[triangles]) <= reach).all(axis=1) & (lengths <= _FOLLOWS * reach).all(axis=1)
@@ -113,7 +113,7 @@ def _deepest(exempt: Exemption, fine: Surface, bone: Bone, number: int, allowed:
     worst = int(depths.argmax())
     vertex = np.flatnonzero(corners.vertices == worst)
     what = f"vertex {vertex[0]}" if len(vertex) else "between vertices"
-    return _Worst(float(depths[worst]), f"{what} at {place_of(fine.points[worst])} in {bone.name}")
+    return _Worst(float(depths[worst]), f"{what} at {place_of(fine.points[worst])} in {bone}")
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fem_reference.effects import Effect, in_situ, regions_named
+from fem_reference.effects import Effect, in_situ, moduli, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
@@ -91,6 +91,15 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
         cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
         pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
         raise InputError(place, f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+
+
+def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
+    """Raise an InputError that names ``place`` unless laws resist shear and a change of volume at rest: fibres alone do neither."""
+    found = moduli(effects)
+    for kind, modulus, law in (("shape", found.shear, "neo_hooke"), ("volume", found.bulk, "incompressible")):
+        if not modulus > 0:
+            got = f"effects that do not resist a change of {kind} at rest"
+            raise InputError(place, got, f'a law that does, such as "{law}", beside fibres and loads')
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:

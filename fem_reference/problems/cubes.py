@@ -1,4 +1,4 @@
-"""Cubes of a material in a homogeneous state, at a material point: the stress follows from the energies of effects alone."""
+"""Cubes of a material in a homogeneous state, as at a single material point: the stress follows from the effects' energies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats
 
-FREE = None  # a side that no stress acts on
-# Of the greatest stress that acts, and of the bulk modulus for rounding: what may be left on free sides.
+FREE = None  # an axis along which no stress acts
+# The stress that may remain on free sides: a share of the greatest stress, and for rounding a share of the bulk modulus.
 _LEFT, _ROUNDING = 1e-8, 1e-13
 
 
@@ -25,7 +25,7 @@ class CubeState:
 
     @property
     def stretches(self) -> Floats:
-        """Along x, y and z, (3,)."""
+        """The stretches (3,) along x, y and z."""
         return np.diag(self.F)
 
     def poisson_ratio(self, loaded: int, axis: int) -> float:
@@ -34,7 +34,7 @@ class CubeState:
 
 
 def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats:
-    """The slope (3, 3) [MPa] of the energies of effects that are ``acting`` in full, at ``F`` (3, 3), exact but for rounding."""
+    """The derivative (3, 3) [MPa] by ``F`` (3, 3) of the energies of the effects ``acting`` in full, exact but for rounding."""
     jets = variables(F.reshape(9, 1), curved=False)
     rows = [jets[3 * i : 3 * i + 3] for i in range(3)]
     energy = total_energy([(one, 1.0) for one in acting], State(F=rows, fibre=tuple(fibre), functions=JET_FUNCTIONS))
@@ -44,9 +44,9 @@ def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats
 def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: Floats) -> CubeState:
     """The state of a cube at ``stretches`` along x, y and z, ``FREE`` where no stress acts; at least one is given.
 
-    Fibres lie in the plane of x and y. Where they are at an angle to the load, lines along y lean towards x, so that no shear
-    stress acts: the cube is under tension or compression along x alone, as far from plates that would hinder this. ArithmeticError
-    where no such state is found.
+    Fibres lie in the plane of x and y. Where they are at an angle to the load, the cube is sheared (lines along y lean towards x)
+    until no shear stress acts: it is in tension or compression along x alone, as far away from plates, which would prevent the
+    shear. ArithmeticError where no such state is found.
     """
     if not all(one is FREE or 0 < one < np.inf for one in stretches):
         raise InputError("stretches", stretches, "numbers above zero, or FREE")

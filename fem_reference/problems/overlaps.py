@@ -52,8 +52,8 @@ def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
     """The depth [mm] to which a surface ``now`` goes through itself, at least, and its place (3,), away from vertices that do so at
     ``rest``; triangles that cross show less than a side that is within another, which is measured where there are none at rest.
     """
-    pairs, known = self_crossings(now), _crossing(rest)
-    new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))] if len(pairs) else pairs
+    known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
+    new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]
     if not len(new):
         return 0.0, now.points[0]
     one, other = np.swapaxes(now.points[now.triangles[new]], 0, 1)

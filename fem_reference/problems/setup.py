@@ -60,7 +60,7 @@ class Bone:
 
     def distances(self, frame: float, points: Floats) -> Floats:
         """Distance (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
-        return self.shape.sample(apply(np.linalg.inv(self.pose(frame)), points)).distance
+        return self.shape.distances(apply(np.linalg.inv(self.pose(frame)), points))
 
 
 @dataclass(frozen=True, eq=False)

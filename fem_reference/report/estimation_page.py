@@ -16,14 +16,14 @@ from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
-# Control points in the plane, as in the report's Figure 3.1.
-# Distances of two Gaussians in their radii: from 2 sqrt(log 2) = 1.665 on they are two surfaces.
+# Distances between two Gaussians, in radii: from 2 sqrt(log 2) = 1.665 on their surface is in two parts.
 _APART = (1.2, 1.6, 1.65, 1.7)
+# Control points in the plane, as in the report's Figure 3.1.
 _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])
 
 
 def page(found: Estimation) -> Page:
-    """The page of the errors of estimation techniques."""
+    """The page with the errors of the estimation techniques."""
     answers = {".".join(key): one for key, one in described().items()}
     drawings = (_figure(), _curves(found) if found.curves else None, _blobs(), _fits(found) if found.fits else None)
     contents = {
@@ -42,10 +42,10 @@ def page(found: Estimation) -> Page:
 def said(found: Estimation) -> str:
     """The best technique for fibres, and the accuracy of Gaussians, where they were measured."""
     sentences = list[str]()
-    if found.curves:  # not where all fibres have few points
+    if found.curves:  # empty where no fibre has enough points
         errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
         best = min(errors, key=lambda name: float(errors[name]))
-        sentences.append(f"Of curves through a few points of a fibre {best} deviates least")
+        sentences.append(f"Of the curves through a few points of a fibre, {best} deviates least")
     most = max((one.gaussians for one in found.fits), default=0)
     if fits := [one for one in found.fits if one.gaussians == most]:
         sentences.append(
@@ -57,13 +57,13 @@ def said(found: Estimation) -> str:
 
 
 def facts(found: Estimation) -> dict[str, Any]:
-    """All of it as valid JSON."""
+    """All results of the page, as values that JSON can hold."""
     names = ("curves", "heights", "fits", "decompositions", "rods", "answers", "missing")
     return {name: plain(getattr(found, name)) for name in names}
 
 
 def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...], list[Error]]:
-    """The errors by what they have under ``names``."""
+    """The errors, grouped by the values of their attributes ``names``."""
     found = dict[tuple[object, ...], list[Error]]()
     for one in errors:
         found.setdefault(tuple(getattr(one, name) for name in names), []).append(one)
@@ -96,14 +96,14 @@ def _curves(found: Estimation) -> Drawing:
             axes.plot(counts, means, marker="o", markersize=3, **look_of(i + 1), label=name)
         logarithmic(axes)
         axes.set_xticks(counts)
-        axes.set(xlabel="known points of a fibre", ylabel="rms deviation of the others, mm")
+        axes.set(xlabel="number of known points of a fibre", ylabel="rms deviation at the other points, mm")
         axes.legend(fontsize="x-small")
 
-    return drawn("estimation-fibres", "Fibres: error against known points", (4.6, 4.0), draw)
+    return drawn("estimation-fibres", "Fibres: error against number of known points", (4.6, 4.0), draw)
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """The level (m, n) of two Gaussians of radius 1, positive inside, in a plane: at coordinates along (n,) and across (m,)."""
+    """Coordinates along (n,) and across (m,) a plane, and the level (m, n) there of two Gaussians of radius 1, positive inside."""
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))
@@ -112,7 +112,7 @@ def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
 
 
 def _blobs() -> Drawing:
-    """The report's Figure 7.1: two Gaussians that join."""
+    """The report's Figure 7.1: two Gaussians that merge."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, apart in enumerate(_APART):
@@ -120,7 +120,7 @@ def _blobs() -> Drawing:
             axes.plot([], [], color=colour_of(i + 1), label=f"{apart:g} radii apart")
         axes.set(
             aspect="equal", xlabel="radii", ylabel="radii", ylim=(-1.5, 0.9)
-        )  # below the curves there is room for the legend
+        )  # leaves room for the legend below the curves
         axes.legend(fontsize="x-small", loc="lower center", ncols=2)
 
     return drawn("estimation-blobs", "Two Gaussians, one surface or two (Figure 7.1)", (4.6, 4.0), draw)
@@ -135,7 +135,7 @@ def _fits(found: Estimation) -> Drawing:
             axes.plot(counts, errors, "o-", color=colour_of(i + 1), label=case)
         logarithmic(axes)
         axes.set_xticks(sorted({one.gaussians for one in found.fits}))
-        axes.set(xlabel="Gaussians", ylabel="rms deviation of the surface, mm")
+        axes.set(xlabel="number of Gaussians", ylabel="rms deviation of the surface, mm")
         axes.legend(fontsize="x-small")
 
-    return drawn("estimation-surfaces", "Muscles: error against Gaussians", (4.6, 4.0), draw)
+    return drawn("estimation-surfaces", "Muscles: error against number of Gaussians", (4.6, 4.0), draw)

@@ -261,7 +261,8 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
         return Outcome(status, f"{why}{last}; {reached}", cost)
     if ended.code:
         how = f"signal {-ended.code}" if ended.code < 0 else f"exit status {ended.code}"
-        return Outcome("crashed", f"{how} after {took}{last}; {reached}", cost)
+        program = programs.found(shlex.split(settings.command)[0], settings.place)
+        return Outcome("crashed", f"{how} of {program} after {took}{last}; {reached}", cost)
     if trouble is not None:
         failed: Status = "diverged" if "not finite" in str(trouble.got) else "crashed"
         why = str(trouble).replace(f"{out}/", "").replace(str(out), "{out}")
@@ -289,11 +290,5 @@ def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended)
     return found | {"seconds_per_frame": said.seconds_per_frame, "seconds_solve": seconds}
 
 
-SOLVES = (
-    CommandSolver(
-        settings=CommandSettings,
-        solve=solve,
-        require=require,
-        example={"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10},
-    ),
-)
+_EXAMPLE = {"command": "my_solver --iterations {iterations} {scene} {out}", "iterations": 10}
+SOLVES = (CommandSolver(settings=CommandSettings, solve=solve, require=require, example=_EXAMPLE),)

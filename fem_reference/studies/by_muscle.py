@@ -1,4 +1,4 @@
-"""Several muscles of one reference: a comparison of each, with candidates that solve it by itself."""
+"""Several muscles solved together by one reference: a comparison for each, with candidates that solve it by itself."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -22,8 +22,8 @@ ALONE = "Each candidate solves each muscle by itself, without the other muscles.
 
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
-    """Comparisons of the ``muscles`` of a case by name. ``worst``: for each solver that has two of them, the solver, the two, the
-    greatest depth [mm] to which they are in each other, and its frame. ``lacking``: candidates and muscles without frames of them.
+    """Comparisons of the ``muscles`` of a case, by name. ``worst``: for each solver and pair of muscles that it has, the solver,
+    the pair, their greatest depth of overlap [mm], and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
     """
 
     muscles: dict[str, Comparison]
@@ -32,13 +32,13 @@ class ByMuscle:
 
     @property
     def penetration(self) -> list[dict[str, object]]:
-        """The depths as rows."""
+        """The rows of ``worst`` as dictionaries."""
         names = ("solver", "muscle", "other", "depth_mm", "frame")
         return [dict(zip(names, row, strict=True)) for row in self.worst]
 
 
 def views(bench: Bench[Case], run: Run) -> dict[str, Run]:
-    """The ``run`` of several muscles as one of each, by name."""
+    """The ``run`` of several muscles split into one for each, by name."""
     problem, parts = bench.problem(), bench.parts
     assert isinstance(problem, MusclesProblem)
     found = {name: run_of(run, problem, name) for name in parts}
@@ -46,8 +46,8 @@ def views(bench: Bench[Case], run: Run) -> dict[str, Run]:
 
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
-    """The comparison of each muscle of a case of several: with the one reference of all, and with candidates that solve it alone.
-    Frames are read from folders with the names of the muscles; a candidate may lack some.
+    """A comparison for each muscle of a case with several: its part of the common reference, and candidates that solve it alone.
+    Recorded frames are read from folders named after the muscles; a candidate may lack some.
     """
     parts, found = bench.parts, dict[str, Comparison]()
     chosen = [(bench.found(*one), one[1]) for one in chosen]
@@ -71,7 +71,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate with its place, its frames those of the muscle of a ``name``; None where it has none of it."""
+    """A candidate with its place; if recorded, with the folder of the muscle ``name``, or None where there is none."""
     entry, place = chosen
     if entry.solver != "recorded":
         return chosen

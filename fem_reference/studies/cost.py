@@ -28,26 +28,26 @@ from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials
 
 log = logging.getLogger(__name__)
 
-# What is measured on every point; forces where a solver has them.
+# The metrics of every point of the study; the joint moment only where a solver has forces.
 METRICS = (*in_tables(), "joint_moment")
-# Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
+# Surface solvers are also tried on 4**power times as many triangles; these surfaces are stored beside the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
 SURFACES = "surfaces"
 FILE = "study.json"
-# Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
+# For this many of the reference's coarser runs, the finest of them, claimed error bars are compared with true errors.
 _CLAIMING = 4
 
 
 def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
-    """Study each of ``scenes`` with runs in ``store``, solved where they are missing; ``only`` these solvers, if any."""
+    """Study each of ``scenes`` with runs in ``store``, solved where missing; with ``only`` these solvers, if any are named."""
     cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
     return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``, one of a case: that of its own name before those with another, with the points of the others
-    that are against the same truth, such as of a solver of one's own; InputError where there is none.
+    """The studies below ``folder``, one for each case: preferably the one in the folder named after the case, joined by the points
+    of other studies against the same truth, such as those of a user's own solver; InputError where there is none.
     """
     known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
     found = dict[str, CaseStudy]()
@@ -55,12 +55,12 @@ def stored(folder: Path) -> list[CaseStudy]:
         found[study.case] = _with_points(found.get(study.case, study), study)
     if not found:
         want = "a folder with studies: fem-reference study CASE makes one"
-        raise InputError("--out", f'"{folder}", where no study is', want)
+        raise InputError("--out", f'"{folder}", which has no study', want)
     return list(found.values())
 
 
 def _with_points(study: CaseStudy, other: CaseStudy) -> CaseStudy:
-    """A study of a case with the points of an ``other`` one that it has not, where both are against the same known truth."""
+    """A study of a case, plus the points that only the ``other`` one has, if both are against the same known truth."""
     if not study.truth_key or study.truth_key != other.truth_key:
         return study
     own = {(point.name, str(point.choice)) for point in study.points}
@@ -124,14 +124,14 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the solver's defaults, whether the case states the others or not, and the hash of
-    a program.
+    """The settings of a trial that differ from the solver's defaults, whether or not the case states the others, and the hash of a
+    program.
     """
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)
         computed = {name: getattr(own, name) for name in type(own).model_computed_fields}
-    except InputError:  # the trial failed for it
+    except InputError:  # the trial failed for this reason
         return given
     fields = {key: field for key, field in type(own).model_fields.items() if not field.exclude}
     changed = {key: value for key, value in given.items() if key in fields and getattr(own, key) != fields[key].default}
@@ -139,7 +139,7 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
-    """The greatest magnitude over frames, NaN where one frame is, of deviations by metrics of these ``names``, by statistic."""
+    """For each statistic of the metrics ``names``, the greatest magnitude of its deviation over frames; NaN where any is NaN."""
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
 
@@ -156,14 +156,13 @@ def costs(run: Run) -> dict[str, float]:
     """Costs of a run: those of ``COSTS`` that are known, and seconds by phase."""
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
-    found = {} if seconds is None else {"seconds_per_frame": seconds}
-    return found | {
-        name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")
-    }
+    found = {name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")}
+    # A time that a program states is of a frame number: one frame that is wanted may be many of these.
+    return found | ({} if seconds is None else {"seconds_per_frame": seconds})
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
-    """The error bars of the reference on coarser tetrahedra, beside its difference from the truth."""
+    """The error bars of the reference on coarser meshes, each beside the difference of that run from the truth."""
     found = list[Claim]()
     on_tetrahedra = [one for one in made if (one.trial.name, one.trial.knob) == ("reference", TETRAHEDRA)]
     members = [(one.trial, run) for one in on_tetrahedra if (run := one.reached) is not None]

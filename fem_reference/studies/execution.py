@@ -1,4 +1,4 @@
-"""The run of a case by a solver: from the store where it was solved before, else solved now and stored."""
+"""The run of a case by a solver: from the store if it was solved before, else solved now and stored."""
 
 import logging
 import math
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 
 class Bench[C: Case]:
-    """A case with its set-up and its problem, each made once and only when it is needed, and the store of its runs."""
+    """A case with its set-up and its problem, each made once, when first needed, and the store of its runs."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None, time_limit: float = math.inf) -> None:
         self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
@@ -47,9 +47,9 @@ class Bench[C: Case]:
         self._begin()
 
     def _begin(self) -> None:
-        """Make anew what depends on the effects that act."""
+        """Reset what depends on the effects that act, so that it is made again when needed."""
         self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
-        # The watch for effects that the case left out; None where it left out none.
+        # Watches for effects that the case left out and that turn out to matter; None where it left out none.
         self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
     @property
@@ -74,12 +74,12 @@ class Bench[C: Case]:
         return self._problem()
 
     def of_muscle(self) -> "Bench[MuscleCase]":
-        """The bench itself, where its case is one of a muscle; else InputError."""
+        """This bench, if its case is that of a single muscle; else InputError."""
         casefile.muscle(self.scene)
         return cast("Bench[MuscleCase]", self)
 
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
-        """The ``choice`` with its folder, if any, as a path: one that the scene names is found as its files are, and only there."""
+        """The ``choice`` with its folder, if any, as a path: one that the scene names is looked up only where its files are."""
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
             return choice
@@ -97,7 +97,7 @@ class Bench[C: Case]:
 
     @property
     def parts(self) -> "dict[str, Bench[MuscleCase]]":
-        """The benches of the muscles of a case of several, by name."""
+        """The bench of each muscle of a case with several, by name."""
         scene = self.scene
         if not isinstance(scene, MusclesCase):
             return {}
@@ -109,8 +109,8 @@ class Bench[C: Case]:
         return made
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """InputError where settings of the reference, of a candidate of the case (except frames that are made later) or of the
-        ``chosen`` solvers do not suit the case. The problem made of the case is checked only when it is solved.
+        """InputError where settings of the reference, of a candidate of the case (except recorded frames, which may come later) or
+        of the ``chosen`` solvers do not suit the case. The problem made from the case is checked only if it has to be solved.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")
@@ -129,7 +129,7 @@ class Bench[C: Case]:
                 offer.check_problem(own, self.given(offer, own), join(self.scene.place, place))
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run of a solver of this package, by its name on pages; ``place`` is where the scene chooses it."""
+        """The run of a solver, stored or solved now. ``name``: its name on pages; ``place``: the scene's key that chooses it."""
         run = self._run(name, choice, place, self._made)
         assert run is not None  # what is not stored is made
         return run
@@ -139,19 +139,19 @@ class Bench[C: Case]:
         return self.obtain("reference", self.scene.reference, "reference")
 
     def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> tuple[Run, ...]:
-        """The reference and the ``chosen`` candidates, each with its place: frames are read before anything is solved."""
+        """The runs of the reference and the ``chosen`` candidates, each with its place; recorded frames are read before solving."""
         read = {one.name: self.read(one.name, one, place) for one, place in chosen if one.solver == "recorded"}
         reference = self.reference()
         return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
-        """The stored run that ``obtain`` takes up, None where it would solve one."""
+        """The stored run that ``obtain`` would reuse; None where it would solve."""
         other = Bench(self.scene, self.store, self.ranks)
         other._setup = self._setup
         return other._run(name, choice, place, lambda _: None)
 
     def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
-        """The stored run, or what ``make`` makes; with all effects that turn out to matter in it."""
+        """The stored run, or the one that ``make`` returns, with all effects that turn out to matter."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         offer = solvers.find(choice.solver, place, self.scene.task)
@@ -166,7 +166,7 @@ class Bench[C: Case]:
             self._begin()
             assert run.folder is not None  # from the store
             folder = self.folder(choice, place)
-            with making.locked(folder):  # goes on from what is kept of a run that was stopped for it
+            with making.locked(folder):  # continues the run that was stopped for this
                 pass_on(run.folder, folder)
 
     def _stored(self, wanted: Wanted) -> Run | None:
@@ -174,7 +174,7 @@ class Bench[C: Case]:
         return None if run is None else self._checked(run)
 
     def _made(self, wanted: Wanted) -> Run:
-        """The run, solved now, by one process at a time; errors of the input are raised before anything is written."""
+        """The run, solved now, by one process at a time; errors in the input are raised before anything is written."""
         wanted.offer.require(wanted.settings)
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'
@@ -192,11 +192,11 @@ class Bench[C: Case]:
             return self._stored(wanted) or self._checked(self._solved(wanted, given))
 
     def _ended(self, solver: str) -> tuple[str, ...]:
-        """Statuses of stored runs that are taken again."""
+        """The statuses with which a stored run is reused."""
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
+        """The ``run``; if it is of a muscle, by a solver that models effects, with its second check, stored with it."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run
@@ -207,7 +207,7 @@ class Bench[C: Case]:
         return self.watch() if solvers.takes_effects(solver) else None
 
     def _turned_out(self, run: Run) -> tuple[Decision, ...]:
-        """The effects that the case left out and that turn out to matter in a stored ``run``, at the first frame that shows one."""
+        """The effects that the case left out but that matter in a stored ``run``, as found at the first frame that shows any."""
         watch = self._watched(run.solver)
         if watch is None or run.origin.get("watched") == watch.names:
             return ()
@@ -215,7 +215,7 @@ class Bench[C: Case]:
         return next(filter(None, making.seen(watch, run.folder, run.numbers)), ()) or watch.end()
 
     def _solved(self, wanted: Wanted, given: CaseSetup) -> Run:
-        """The run of the problem that its solver is ``given``, written into its folder as it goes."""
+        """The run of the problem ``given`` to the solver, written into its folder frame by frame."""
         solver = wanted.choice.solver
         origin = self.origin(solver, wanted.settings)
         if wanted.offer.fills(wanted.settings):
@@ -234,11 +234,11 @@ class Bench[C: Case]:
         return store.load(wanted.folder)
 
     def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
-        """The input of a solver: the problem, or for a solver without tetrahedra the set-up of the muscle."""
+        """The input of a solver: the problem or, for a solver without tetrahedra, the set-up of the muscle."""
         return cast("CaseSetup", self._problem()) if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """A recorded run, checked against the set-up of the scene; it is read each time and not stored."""
+        """A recorded run, checked against the set-up of the scene; it is read each time and never stored."""
         if self.scene.parts:
             raise InputError(place, "frames of several muscles", "frames of each, in folders with their names")
         wanted, frames = self.settings(choice, place), list[Frame]()
@@ -258,7 +258,7 @@ class Bench[C: Case]:
         return key(self.scene.key, solver, numerics)
 
     def origin(self, solver: str, settings: Record) -> dict[str, object]:
-        """Provenance of a run, for people and for doubt."""
+        """Provenance of a run, to read and to reproduce it by."""
         acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {
             "case": self.scene.name,
@@ -275,7 +275,7 @@ class Bench[C: Case]:
 
 
 def _part_of(of: Callable[[], CaseSetup], name: str) -> Setup:
-    """The set-up of a muscle, by ``name``, of several."""
+    """The set-up of the muscle ``name`` of a case with several."""
     whole = of()
     assert isinstance(whole, MusclesSetup)
     return whole.muscles[name]

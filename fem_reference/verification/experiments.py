@@ -4,14 +4,11 @@ An entry states whether the value is within the uncertainty of the experiment; o
 pinned, so that a change of a law or of the material does not pass unseen.
 """
 
-import math
 from dataclasses import replace
 from functools import partial
-from typing import cast
 
 from fem_reference.assessment import muscle_cubes
-from fem_reference.assessment.catalogue import Entry, Finding, Lab, Result, result
-from fem_reference.assessment.experiments import find, ratio
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.assessment.muscle_cubes import QUANTITIES, SHIPPED, Material, Quantity, with_collagen
 from fem_reference.effects import make
 
@@ -32,26 +29,11 @@ PINNED = {
     "strip_poisson_fibre": 0.4994741,
     "strip_poisson_across": 0.4994741,
 }
-# Vastus lateralis: Ward et al. 2009, doi 10.1007/s11999-008-0594-8, and arms of the knee's extensors, all from memory.
-FIBRE, OPTIMAL, PENNATION, ARM = 99.4, 2.7, 18.4, 40.0  # mm at a sarcomere length of um, degrees, mm
-_ANGLES = math.radians(110 - 50)
 
 
 def measured(_: Lab, quantity: Quantity, material: Material) -> Finding:
     """A quantity of a material, with the reason why the shipped one cannot reach it."""
     return Finding(quantity.of(material), note=f"Known limit: {quantity.limit}" if quantity.limit else "")
-
-
-def vastus_stretch(_: Lab, arm: float) -> Finding:
-    """The stretch of fibres of a planar muscle of constant thickness that lengthens by an ``arm`` [mm] times 60 degrees."""
-    length = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL
-    along, across = math.cos(math.radians(PENNATION)), math.sin(math.radians(PENNATION))
-    found = [math.hypot(along + one * _ANGLES / length, across) for one in (arm - 5, arm, arm + 5)]
-    note = (
-        f"Moment arms 5 mm less and more give {found[0]:.2f} and {found[2]:.2f}. Tendon and aponeurosis are rigid here; in a body "
-        "they take a part. Architecture and moment arm are from memory."
-    )
-    return Finding(found[1], note=note)
 
 
 def _control(name: str) -> tuple[str, Material]:
@@ -84,8 +66,6 @@ def _entry(quantity: Quantity) -> Entry:
     )
 
 
-_SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
-_STRETCH, _SD = ratio(*_SARCOMERES)
 _ORDER = "An order: 1 where both are met by 1 % and more, 0 where not."
 _LIMIT = "A law of fibres that pull in tension only meets neither."
 ORDERS = Quantity(
@@ -130,25 +110,4 @@ ENTRIES = (
     *map(_entry, QUANTITIES),
     _orders(ORDERS, 0.0, (SHIPPED, COLLAGEN), "Collagen across the fibres."),
     _orders(WITH_COLLAGEN, 1.0, (COLLAGEN, SHIPPED), "No collagen."),
-    EXPERIMENT(
-        name="vastus_stretch",
-        title="Idealised vastus lateralis, knee flexed from 50 to 110 degrees: stretch of its fibres",
-        unit="1",
-        measure=vastus_stretch,
-        given={"arm": ARM},
-        negative_control="Moment arm 10 % too great.",
-        wrong={"arm": 1.1 * ARM},
-        truth=_STRETCH,
-        within=_SD,
-        because="The standard deviation of the ratio of two sarcomere lengths of six people, as if independent.",
-        source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture and arm of the model from memory",
-        pinned=1.3859333,
-        facts=_SARCOMERES,
-        from_memory=True,
-    ),
 )
-
-
-def results() -> dict[str, Result]:
-    """All of them by name; none needs a solver."""
-    return {one.name: result(one, one.find(cast("Lab", None)), 0.0, with_negative_control=False) for one in ENTRIES}

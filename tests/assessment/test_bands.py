@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem_reference.assessment import bands, chaos
+from fem_reference.assessment import bands
 from fem_reference.assessment.bands import Design, of_field, of_values, sampled
 from fem_reference.assessment.uncertainty import Band, Parameter
 
@@ -30,17 +30,17 @@ def test_the_band_of_a_linear_problem_is_exact() -> None:
     values = (own.points @ [0.5, 1.0])[:, None] * [0.0, 1.0, 2.0] + 3
     found = of_values(empty(), own, values)
     tail = 1.5 - np.sqrt(4 * 0.05)
-    assert (found.by, found.refused) == ("polynomial", "")
+    assert (found.by, found.refused) == ("process", "")
     assert found.low == pytest.approx([3, 3 - tail, 3 - 2 * tail], abs=5e-3)
     assert found.median == pytest.approx([3, 3, 3], abs=5e-3)
     assert found.high == pytest.approx([3, 3 + tail, 3 + 2 * tail], abs=5e-3)
-    assert list(found.first.values()) == pytest.approx([0.2, 0.8], abs=1e-9)
+    assert list(found.first.values()) == pytest.approx([0.2, 0.8], abs=2e-3)
     assert found.width == pytest.approx(4 * tail, abs=0.01)
 
 
 def test_the_band_of_a_field_is_that_of_its_distance() -> None:
     """A field of three points that moves by x along one and by 2y along another: rms sqrt(x^2 + 4 y^2) / sqrt(3), with a kink at 0,
-    which no polynomial follows; the field itself is linear.
+    which no smooth surrogate follows; the field itself is linear.
     """
     own = design(16)
     x, y = own.points.T
@@ -52,7 +52,7 @@ def test_the_band_of_a_field_is_that_of_its_distance() -> None:
     assert [found.low[2], found.median[2], found.high[2]] == pytest.approx(sampled_there, rel=0.01)
     assert found.high == pytest.approx(np.array([0, 0.5, 1]) * found.high[2])
     assert found.error < 1e-12
-    assert list(found.total.values()) == pytest.approx([0.2, 0.8], abs=1e-6)
+    assert list(found.total.values()) == pytest.approx([0.2, 0.8], abs=2e-3)
 
 
 def test_a_run_that_is_not_a_number_makes_no_band() -> None:
@@ -102,17 +102,12 @@ def test_what_no_surrogate_follows_has_no_sensitivities() -> None:
     assert np.isnan(few.low).all()
 
 
-def test_what_a_polynomial_misses_has_the_shares_of_a_process() -> None:
-    """A steep step in x, times 2 + y: a polynomial misses 11 % of the variance, of which 4 of 4 1/3 parts are by x alone and the
-    rest with y, whatever the step.
-    """
+def test_a_steep_step_is_followed() -> None:
+    """In x, times 2 + y: of the variance 4 of 4 1/3 parts are by x alone and the rest with y, whatever the step."""
     own = design(32)
     x, y = own.points.T
     found = of_values(empty(), own, (np.tanh(8 * x) * (2 + y))[:, None] * [0.5, 1.0, 1.0])
-    assert (found.by, found.error < 0.05 < chaos.fit(own.points, np.tanh(8 * x)[:, None] * (2 + y)[:, None]).error) == (
-        "process",
-        True,
-    )
+    assert found.by == "process"
     assert list(found.first.values()) == pytest.approx([12 / 13, 0], abs=0.02)
     assert list(found.total.values()) == pytest.approx([1, 1 / 13], abs=0.02)
 

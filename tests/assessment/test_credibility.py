@@ -23,7 +23,7 @@ from fem_reference.assessment.experiments import facts, find
 from fem_reference.assessment.moment_arms import ArmRange, ArmsBeside
 from fem_reference.assessment.muscle_cubes import QUANTITIES
 from fem_reference.scenes.case import HOME
-from fem_reference.verification import experiments, runner
+from fem_reference.verification import runner
 from tests.verification.stand_ins import entry
 
 CLAIM = Evidence(
@@ -108,12 +108,14 @@ def test_neither_a_number_nor_a_word_of_a_source_is_a_mode() -> None:
 
 
 def test_what_is_from_memory_and_what_is_an_order_is_stated_by_the_catalogue() -> None:
-    beside = {name: of_result(one) for name, one in experiments.results().items()}
+    entries = [one for one in runner.entries().values() if one.kind == "experiment"]
+    found = [result(one, Finding(one.pinned), 0.0, with_negative_control=False) for one in entries]
+    beside = {one.entry.name: of_result(one) for one in found}
     orders = {"cube_softest_midway", "cube_stiffest_across", "cube_both_orders", "cube_both_orders_collagen"}
     assert {name for name, one in beside.items() if one.is_order} == orders
     assert not [name for name, one in beside.items() if one.validates]
-    for name, one in experiments.results().items():
-        assert one.entry.from_memory == ("memory" in one.entry.source), name
+    for one in entries:
+        assert one.from_memory == ("memory" in one.source), one.name
 
 
 def test_other_models_are_counted_apart_and_decide_no_grade() -> None:
@@ -134,6 +136,14 @@ def test_nine_tenths_of_the_poses_are_not_all() -> None:
     published = np.where(made.found.angles < 17, 15.0, 25.0)
     one = of_arms(replace(made, published=ArmRange(made.found.angles, published, published)))
     assert (one.value, one.truth, one.met) == (pytest.approx(90), 100, False)
+
+
+def test_a_remark_has_the_values_of_coarser_meshes_and_the_source() -> None:
+    one = replace(
+        measured(1.02), finding=Finding(1.02, ladder=((2.0, 1.04), (1.0, 1.02)), note="Twice the load steps.")
+    )
+    assert of_result(one).remark == "Cells of 2 mm give 1.04. Twice the load steps. Beside: by hand."
+    assert of_result(measured(1.02)).remark == "Beside: by hand."
 
 
 def test_a_remark_counts_the_poses_in_which_the_published_arm_is_known() -> None:

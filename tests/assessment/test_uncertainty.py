@@ -19,7 +19,7 @@ def band(bar: float | None = 0.1, *, distance: bool = False, quantity: str = "fi
     return Band(
         *(quantity, "Fibre length", "mm", (0, 10, 20, 30), nominal, low, middle, high, bars, distance),
         error=0.01,
-        by="polynomial",
+        by="process",
         first=shares,
         total=shares | {"effect[0].mu": 0.3},
     )

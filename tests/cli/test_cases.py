@@ -16,6 +16,7 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 OWN = Path(__file__).parents[2] / "examples" / "own_command"
 
 

@@ -67,10 +67,18 @@ def test_an_entry_finds_its_truth(entry: Entry, lab) -> None:
         assert found.finding.order is None or found.finding.order > entry.refinement.order - 0.5
 
 
+def controls():
+    """Entries whose negative control is measured: by day one of each function that measures, at night all."""
+    asked = set()
+    for entry in ENTRIES.values():
+        function = getattr(entry.measure, "func", entry.measure)
+        if not entry.slow_negative_control:
+            yield pytest.param(entry, marks=pytest.mark.nightly if function in asked else (), id=entry.name)
+            asked.add(function)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "entry", [e for e in ENTRIES.values() if not e.slow_negative_control], ids=lambda entry: entry.name
-)
+@pytest.mark.parametrize("entry", list(controls()))
 def test_with_its_negative_control_it_misses_clearly(entry: Entry, lab) -> None:
     found = result(entry, entry.find(lab, with_negative_control=True), 0.0, with_negative_control=True)
     assert found.word == "fail", (found.finding, found.truth, found.within)

@@ -61,4 +61,3 @@ def test_a_triangle_and_a_point_fill_their_boxes() -> None:
     found = around(surface.points, np.array([1.0, 2.0, 0.5]))
     assert_allclose(found.low.T, [[-1, 4, 1], [-1, 2, 0], [-1.5, 5.5, 6.5]])
     assert_allclose(found.high.T, [[1, 6, 3], [3, 6, 4], [-0.5, 6.5, 7.5]])
-    assert_array_equal(found.hull, ([-1.5, 2, 0], [3, 6.5, 7.5]))

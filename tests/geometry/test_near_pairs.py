@@ -96,6 +96,18 @@ def test_of_sizes_whose_powers_are_no_numbers_nothing_is_certain(size) -> None:
     assert len(self_crossings(unit)) > 0
 
 
+def test_a_surface_that_is_met_again_gives_what_a_new_one_gives() -> None:
+    """Its sorted triangles are kept: those of ten surfaces, two more than that, must not be mixed up, nor be of a moved one."""
+    bones = [crumpled(seed, 0.3) for seed in range(10)]
+    body = crumpled(20, 0.3)
+    for shift in (0.0, 7.0):
+        moved = body.moved_to(body.points + shift)
+        for bone in (*bones, bones[9].moved_to(bones[9].points + 3.0)):
+            again = pairs(moved, bone)
+            assert len(again) > 10
+            assert again == pairs(moved, Surface(bone.points.copy(), bone.triangles.copy()))
+
+
 def test_degenerate_and_empty_surfaces() -> None:
     point = Surface(np.zeros((3, 3)), np.array([[0, 1, 2]]))
     nothing = Surface(np.zeros((3, 3)), np.zeros((0, 3)))

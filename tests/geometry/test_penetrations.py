@@ -157,9 +157,10 @@ def shared(surface: Surface, body: Obstacle, counts: np.ndarray | None = None) -
 
 
 def found(surface: Surface, body: Obstacle, counts: np.ndarray, *points: np.ndarray) -> penetrations.Shared:
-    return penetrations.shared(
-        surface, counts, lambda places: body.sample(places).distance, np.reshape(points, (-1, 3))
-    )
+    def distance(places: Floats) -> Floats:
+        return body.sample(places).distance
+
+    return penetrations.shared(surface, counts, distance(surface.points), distance, np.reshape(points, (-1, 3)))
 
 
 def cap(radius: float, height: float) -> float:

@@ -165,6 +165,16 @@ def test_outside_the_grid_all_is_far_and_flat(ball: Grid) -> None:
     assert (ball.sample(edges).distance < FAR).all()
 
 
+def test_distances_alone_are_those_of_samples(ball: Grid) -> None:
+    """In the grid, beyond it, and NaN; rounding of 10 mm is 2e-15."""
+    points = np.random.default_rng(0).uniform(-30, 30, (3000, 3))
+    points[0] = np.nan
+    wanted = ball.sample(points).distance
+    assert 0 < (wanted == FAR).sum() < len(points) - 1
+    assert_allclose(ball.distances(points), wanted, rtol=0, atol=1e-13)
+    assert_allclose(Sphere((0, 0, 0), RADIUS).distances(points), Sphere((0, 0, 0), RADIUS).sample(points).distance)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_what_is_not_finite_has_no_distance(ball: Grid, bad: float) -> None:
     assert np.isnan(ball.sample(np.array([[0.0, bad, 0.0]])).distance).all()

@@ -99,6 +99,7 @@ def _said(record: type) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_pictures")
 def test_every_public_name_verb_and_case_is_in_the_reference() -> None:
     assert re.findall(r"^## (\w+)$", reference_pages.api(), re.MULTILINE) == fr.__all__
     assert re.findall(r"^## (\w+)$", reference_pages.gallery(), re.MULTILINE) == fr.cases()

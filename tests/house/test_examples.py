@@ -48,6 +48,7 @@ def output(folder: Path, *words: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_it_ends_in_its_number(folder: Path, script: Path, monkeypatch, capsys) -> None:
     text = script.read_text(encoding="utf-8")

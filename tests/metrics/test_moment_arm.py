@@ -163,3 +163,13 @@ def test_where_a_joint_turns_back_the_way_there_says_nothing() -> None:
     lengths = np.array([[30.0], [28.0], [31.0]])
     arms = excursion_arms(lengths, context_of(joint, run), run.numbers)[:, 0]
     assert_allclose(arms, [4.0, 4.0, 7.5], rtol=1e-12)
+
+
+def test_lines_alone_have_arms_beside_a_reference_whose_overlaps_were_removed_at_rest() -> None:
+    """Its fibres begin 0.1 mm away from those of the lines, which have no surface that could carry them."""
+    joint = joint_of(np.radians(np.arange(0, 40, 4)))
+    run = straight(joint, 10)
+    lines = replace(run, has_surface=False, positions=np.full_like(run.positions, np.nan))
+    context = replace(context_of(joint, run), fibres=Polylines(run.fibres.points + 0.1, run.fibres.offsets))
+    (mean,) = (one for one in measure(lines, at_rest(lines), context, ["moment_arm"]) if one.statistic == "mean")
+    assert_allclose(mean.values, arms_of(run, context_of(joint, run)).mean(axis=1), rtol=1e-12)

@@ -38,7 +38,7 @@ def test_the_first_thing_said_is_what_is_validated_and_what_is_not(tmp_path) -> 
     none = replace(found(), rows=found().rows[2:])
     assert credibility_page.by_grade(none)[0][:2] == ("validated", [])
     text = html.unescape(report.write(credibility_page.page(none), tmp_path / "new", "credibility").read_text())
-    assert '<span class="badge validated">validated</span> <b>nothing</b>' in text
+    assert '<span class="badge validated">validated</span> <b>no quantity</b>' in text
 
 
 def test_what_it_says_in_a_line() -> None:

@@ -64,6 +64,15 @@ def grown(folder: str, *scales: float) -> Run:
     )
 
 
+def test_a_time_that_a_program_states_is_that_of_a_wanted_frame_as_of_any_other() -> None:
+    """0.1 s a frame number, ten of which lie between two wanted frames, as of a solver that the clock times at 1 s for each."""
+    frames = (BALL.points[None] + np.zeros((3, 1, 1)), (0, 10, 20))
+    stated = {"seconds": 4.0, "seconds_solve": 2.0, "seconds_per_frame": 0.1}
+    for given in (stated, {"seconds_solve": 2.0}):
+        made = Run("mine", "command", Outcome("converged", "", given), frames[1], BALL, frames[0])
+        assert cost.costs(made)["seconds_per_frame"] == pytest.approx(1.0)
+
+
 def test_an_error_is_the_greatest_magnitude_of_either_sign() -> None:
     truth = grown("truth", 1.0, 2.0)
     context = MeasurementContext.of(replace(truth, fibres=FIBRE, fibre_positions=None), FIBRE, ())
@@ -79,7 +88,7 @@ def test_a_setting_that_is_its_solvers_own_is_no_setting(tmp_path) -> None:
 
 
 def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f'--out: got "{tmp_path}", where no study is'):
+    with pytest.raises(InputError, match=f'--out: got "{tmp_path}", which has no study'):
         cost.stored(tmp_path)
     (tmp_path / "study").mkdir()
     path = tmp_path / "study" / "study.json"

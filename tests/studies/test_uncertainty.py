@@ -92,7 +92,7 @@ def test_matrices_in_parallel_share_the_force_as_springs_do(tmp_path: Path, monk
     assert found.failures == ()
     assert found.fixed == ("mooney_rivlin c2", "incompressible bulk")
     force = next(band for band in found.bands if band.quantity == "force on lid")
-    assert force.by == "polynomial"
+    assert force.by == "process"
     shares = np.array([4.0, 6.0]) ** 2 / 52
     assert list(force.first.values()) == pytest.approx(shares, rel=0.01)
     assert list(force.total.values()) == pytest.approx(shares, rel=0.01)

@@ -1,7 +1,7 @@
-"""Formats of surface meshes: one file each, found by their folder.
+"""Formats of surface meshes: one module each, discovered in this folder.
 
-A file has one ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written comes back bit by bit, and a
-file that was cut off is refused.
+Each module defines ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written is read back bit for
+bit, and a truncated file is refused.
 """
 
 import importlib
@@ -19,10 +19,10 @@ from fem_reference.io.soup import Soup
 class Format:
     """A mesh format, known by the ``suffixes`` of its files, lower case, with their dots.
 
-    ``read``: points and triangles as in the file; raises any exception where the file is not whole. ``write``: the surface
-    as it is, with its displacement (n, 3) [mm] where the format has room for it; None where the format is only read.
-    ``shares_points``: whether triangles have points in common, in their order; else each has three of its own.
-    ``states_size``: whether a file says how much of it there is; else a cut between two of its lines is not seen.
+    ``read``: points and triangles as in the file; raises any exception where the file is incomplete. ``write``: the surface
+    as it is, with its displacement (n, 3) [mm] where the format has room for it; None where the format can only be read.
+    ``shares_points``: whether triangles index a common list of points, whose order is kept; else each has three of its own.
+    ``states_size``: whether a file states its size; else truncation between two of its lines goes unnoticed.
     """
 
     suffixes: tuple[str, ...]
@@ -34,7 +34,7 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format there is by the suffix of its files; TypeError where a file has none, or one that another has."""
+    """Every format, by the suffix of its files; TypeError where a module defines none, or a suffix that another has."""
     found: dict[str, Format] = {}
     for name in sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")

@@ -18,10 +18,8 @@ from fem_reference.runs.contents import Status
 
 # Clock time that may pass, as a multiple of a limit of processor time: beyond it the machine is too busy, or the program waits.
 CLOCK = 10
-_GLANCES = (
-    0.05,
-    1.0,
-)  # [s] at least and at most between two looks at a program; in between a share of the time that it takes
+# Time [s] between two looks at a program, at least and at most; in between a share of the time that it takes.
+_GLANCES = (0.05, 1.0)
 _SHARE = 0.05
 _TAIL = 4096  # bytes of what it prints that are read
 

@@ -21,7 +21,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.quadratic import quadratic
-from fem_reference.problems.body import check_element, check_quadrature
+from fem_reference.problems.body import check_element, check_quadrature, check_stiffness
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
@@ -54,10 +54,13 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError below ``place`` unless the element suits tetrahedra and effects, and the ranks suit the linear solver."""
+    """Raise InputError below ``place`` unless laws resist shear and a change of volume, the element suits tetrahedra and effects,
+    and the ranks suit the linear solver.
+    """
     if any(isinstance(one, MuscleContact) for one in effects):
         _check_touching(settings, place)
     _check_ranks(settings, join(place, "ranks"))
+    check_stiffness(effects, place)
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 

@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: one process at a time compiles a form, and removes incomplete files of it before."""
+"""Compilation of forms for this machine: one process at a time compiles, and removes incomplete files of a form before."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import ffcx.codegeneration.jit as generator
 import ufl
 from dolfinx import cpp, default_scalar_type, fem, jit
-from ffcx import naming
 from filelock import FileLock
 from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.analysis import extract_constants, extract_type
@@ -24,9 +23,6 @@ from ufl.domain import extract_domains
 
 from fem_reference.foundations import native
 
-_LOCKS = 64  # shared by the forms
-
-
 # All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that nothing is NaN, but NaN
 # shows a state without a value; and it makes the whole process round denormal numbers to zero.
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
@@ -36,21 +32,20 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, run by one process at a time for the same form."""
+    """FFCx's compilation, run by one process at a time: to tell forms apart takes longer than to find a compiled one."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
         folder = Path(str(options["cache_dir"]))
         folder.mkdir(parents=True, exist_ok=True)
-        number = int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS
-        with FileLock(folder / f".fem_reference_{number}.lock"):
+        with FileLock(folder / ".fem_reference.lock"):
             return compiled(objects, *given, **options)
 
     return waiting
 
 
 def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's search for a compiled form, after incomplete files of it are removed. As the process has the form's lock, none is in
+    """FFCx's search for a compiled form, after incomplete files of it are removed. As the process has the lock, none is in
     progress: an interrupted or killed process left them, and FFCx would wait for them.
     """
 

@@ -38,6 +38,13 @@ class FacetPlaces:
     def __getitem__(self, some: Ints) -> "FacetPlaces":
         return FacetPlaces(*(getattr(self, column.name)[some] for column in fields(self)))
 
+    def replaced(self, some: Ints, others: "FacetPlaces") -> "FacetPlaces":
+        """These with ``others`` (k,) at the numbers ``some`` (k,)."""
+        found = self[np.arange(len(self.at))]
+        for column in fields(self):
+            getattr(found, column.name)[some] = getattr(others, column.name)
+        return found
+
 
 @dataclass(frozen=True, eq=False)
 class Facets:

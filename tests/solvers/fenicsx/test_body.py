@@ -80,6 +80,27 @@ def test_a_stabilised_pressure_needs_quadrature_that_sees_it(session) -> None:
         fenicsx.check_effects(fenicsx.Settings(**given), FLESH, "case.toml: reference")
 
 
+@pytest.mark.parametrize(
+    ("laws", "kind"),
+    [
+        ((effects.make("incompressible", bulk="10 MPa"),), "shape"),
+        ((effects.make("neo_hooke", mu="10 kPa"),), "volume"),
+        ((effects.make("squared_invariants", mu="10 kPa", lame="90 kPa"),), "shape"),
+        (
+            (
+                effects.make("incompressible", bulk="10 MPa"),
+                effects.make("fibre_passive", **effects.example("fibre_passive")),
+            ),
+            "shape",
+        ),
+    ],
+)
+def test_a_muscle_has_laws_that_resist_shear_and_a_change_of_volume(laws, kind) -> None:
+    """Fibres alone do neither: it was "can be solved", and diverged with the advice to take smaller cells."""
+    with pytest.raises(InputError, match=f"reference: got effects that do not resist a change of {kind} at rest"):
+        fenicsx.check_effects(fenicsx.Settings(), laws, "case.toml: reference")
+
+
 @BOTH
 def test_both_ends_turned_alike_is_a_rigid_motion(element, session) -> None:
     mesh, turn = box(element, (2, 2, 4), (1.0, 1.0, 2.0)), Turn((1.0, 2.0, 3.0), 1.0, (3.0, 0.0, 1.0))
