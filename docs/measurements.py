@@ -36,7 +36,7 @@ _PROGRAMS = ("newton_vbd", "mujoco_flex", "pbat_vbd", "pbat_xpbd", "pypbd_xpbd",
 _STANDING = ("hip_flexion_tendon", "hip_flexion", "box_squeeze", "adductor_brevis", "gluteus_medius")
 _DRAWN = " ".join(f"my_data/scenes/muscle_{number}" for number in ("0001", "0004", "0005"))
 _LIMITED = "--time-limit '120 s' " + " ".join(f"--program candidates/{name}" for name in _PROGRAMS)
-_FAST_PROGRAMS = ("mujoco_flex",)
+_FAST_PROGRAMS = ("mujoco_flex", "pypbd_xpbd")
 _HARD = "at_rest bones degenerate fibres hip incompressible moved_away round_edge squeeze_bonded squeeze_sliding start twist"
 _TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
 
