@@ -285,7 +285,7 @@ def _uncertainty_candidates(file: str) -> str:
     bands = [one for one in measured["bands"] if not one["refused"]]
     rows = dict[str, dict[str, str]]()
     for one in measured["placed"]:
-        beyond = f" by {number(one['worst'], 2)}" if one["worst"] else ""
+        beyond = f" by {number(one['worst'], 2)}" if one["worst"] and one["word"] != "no answer" else ""
         rows.setdefault(one["candidate"], {})[one["quantity"]] = one["word"] + beyond
     head = ("candidate", *(f"{one['title']}, {one['unit']}" for one in bands))
     cells = ((f"`{name}`", *(row.get(one["quantity"], "") for one in bands)) for name, row in rows.items())

@@ -19,13 +19,15 @@ from fem_reference.foundations.records import Record, parse
 FILE = Path(__file__).with_suffix(".toml")
 _ROUNDED = 0.5  # of a share that is published in whole per cent
 _WHOLE = 100.0  # per cent of the poses
+_READ = ("publication", "abstract", "quotation", "memory")  # from the best on
 # "outside": the model differs from a measurement by more than its uncertainty, whatever else it meets.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
 class Evidence(Record):
     """The evidence of a quantity as it is stated: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in
-    words, the numerical ``bar``, facts that are its model ``band``, and its comparisons with experiments.
+    words, the numerical ``bar``, facts that are its model ``band``, and its comparisons with experiments; ``compared``: what of it
+    these compare, in words.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Evidence(Record):
     bar: str
     band: str = ""
     band_of: str = ""
+    compared: str = ""
     experiments: tuple[str, ...] = ()
     arms: bool = False
 
@@ -52,8 +55,9 @@ def claims() -> tuple[Evidence, ...]:
 @dataclass(frozen=True)
 class Beside:
     """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
-    specimens, None where unknown; ``validates``: whether being within would count as validation; ``kind``: measurement, or model
-    where another model is the truth; ``is_order``: True of an order, which is met (1) or not (0), to a half.
+    specimens, None where unknown; ``validates``: whether being within would count as validation; ``rests_on``: where the truth
+    was read, and what of it or of the model nobody measured; ``kind``: measurement, or model where another model is the truth;
+    ``is_order``: True of an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -65,6 +69,8 @@ class Beside:
     n: int | None
     met: bool
     validates: bool
+    experiment: str
+    rests_on: str
     remark: str = ""
     kind: Kind = "measurement"
     is_order: bool = False
@@ -158,30 +164,47 @@ def of_result(found: Result) -> Beside:
     coarser = [f"Cells of {size:.3g} mm give {value:.4g}." for size, value in found.finding.ladder[:-1]]
     return Beside(
         *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
+        experiment=facts[0].experiment if facts else "",
+        rests_on=_rests_on(facts, is_order=entry.is_order, from_memory=entry.from_memory),
         remark=" ".join([*coarser, *filter(None, [found.finding.note]), f"Beside: {entry.source}."]),
         is_order=entry.is_order,
     )
+
+
+def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
+    """Where ``facts`` were read, by the worst; a tolerance without a deviation, and a model from memory."""
+    read = max((one.read_in for one in facts), key=_READ.index, default="not known")
+    chosen = not is_order and not (facts and all(one.sd for one in facts))
+    remembered = from_memory and read != "memory"
+    return f"{read}{'; ± chosen by us' if chosen else ''}{'; a part of the model from memory' if remembered else ''}"
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
     """Moment arms beside a measured curve, which is to be inside in all poses, or beside another model's range, of which as much is
     to be covered [%] as Modenese and Kohout 2020 cover.
     """
-    quantity = "share_inside" if arms.is_curve else "overlap"
-    reached = experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " "))
+    others_reach = reached(arms)
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
     title = (
         f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.case} beside {arms.experiment})"
     )
-    share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else reached.value
-    others = f"; fibres of another model of this body reach {reached.value:g} %" if arms.kind == "measurement" else ""
+    share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else others_reach
+    others = f"; fibres of another model of this body reach {others_reach:g} %" if arms.kind == "measurement" else ""
     return Beside(
         *(f"{arms.case}-{arms.experiment}", title, "%", share, truth, _ROUNDED, None),
         *(share >= truth - _ROUNDED, False),
+        experiment=arms.experiment,
+        rests_on="quotation, digitised; no ± known",
         remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over the {arms.known} of {len(arms.found.angles)} poses in "
         f"which the published arm is known; {arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm{others}",
         kind=arms.kind,
     )
+
+
+def reached(arms: ArmsBeside) -> float:
+    """The share of poses inside, or the overlap [%], that fibres of Modenese and Kohout 2020 reach on the same body."""
+    quantity = "share_inside" if arms.is_curve else "overlap"
+    return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 
 
 @dataclass(frozen=True)

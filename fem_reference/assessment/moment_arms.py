@@ -2,7 +2,7 @@
 fibres' range, and the overlap of two ranges.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -119,6 +119,12 @@ class ArmsBeside:
     def known(self) -> int:
         """The number of poses in which the published arm is known: share, bias and scatter are over these."""
         return int(np.isfinite(self._centre).sum())
+
+    def between(self, first: float, last: float) -> "ArmsBeside":
+        """The same in the poses from the ``first`` to the ``last`` angle [deg] alone."""
+        here = (self.found.angles >= first) & (self.found.angles <= last)
+        at = self.found.angles[here]
+        return replace(self, found=self.found.at(at), middle=self.middle[here], published=self.published.at(at))
 
     @property
     def _centre(self) -> Floats:

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.io.texts import plain
 
 FORMAT = 1
-Place = Literal["inside", "undecided", "outside", ""]
+Place = Literal["inside", "undecided", "outside", "no answer", ""]
 # Of the width of a band: rounding at its ends.
 _ROUNDING = 1e-6
 
@@ -122,7 +122,7 @@ class Placed:
     def word(self) -> str:
         """The worst place over the frames; empty where there is none."""
         found = set(self.places)
-        return next((word for word in ("outside", "undecided", "inside") if word in found), "")
+        return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 
     @property
     def share(self) -> float:
@@ -132,8 +132,8 @@ class Placed:
 
     @property
     def worst(self) -> float:
-        """The farthest beyond the band over the frames, 0 inside; a value that is not a number counts as infinitely far."""
-        counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one]
+        """The farthest beyond the band over the frames with an answer, 0 inside; NaN for none."""
+        counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one not in ("", "no answer")]
         return float(max(counted, default=math.nan))
 
 
@@ -162,12 +162,15 @@ class Uncertainty:
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
     """A candidate's ``values`` (f,) beside a band: inside and outside by more than the error bar of the reference, else undecided;
-    without a bar nothing is certain.
+    without a bar nothing is certain. A value that is not finite is no answer.
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low
-    margin = np.where(np.isnan(values), -np.inf, np.minimum(above, below))
-    margin = margin + _ROUNDING * np.nan_to_num(band.high - band.low) + _ROUNDING**2
+    margin = (
+        np.where(np.isfinite(values), np.minimum(above, below), math.nan)
+        + _ROUNDING * np.nan_to_num(band.high - band.low)
+        + _ROUNDING**2
+    )
     defined = np.isfinite(band.high)
     places = tuple(
         _place(float(far), float(here)) if known else "" for far, here, known in zip(margin, bar, defined, strict=True)
@@ -178,12 +181,14 @@ def place(candidate: str, band: Band, values: Floats) -> Placed:
 def _place(margin: float, bar: float) -> Place:
     """The place of a value so far inside a band, negative outside.
 
-    >>> _place(0.5, 0.2), _place(0.1, 0.2), _place(-0.3, 0.2), _place(-0.1, math.nan)
-    ('inside', 'undecided', 'outside', 'undecided')
+    >>> _place(0.5, 0.2), _place(0.1, 0.2), _place(-0.3, 0.2), _place(-0.1, math.nan), _place(math.nan, 0.2)
+    ('inside', 'undecided', 'outside', 'undecided', 'no answer')
     """
+    if math.isnan(margin):
+        return "no answer"
     if margin >= bar:
         return "inside"
-    return "outside" if margin < -bar or margin == -math.inf else "undecided"
+    return "outside" if margin < -bar else "undecided"
 
 
 def facts(found: Uncertainty) -> dict[str, Any]:

@@ -2,19 +2,20 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fem_reference.assessment.credibility import Beside, Credibility, count
+from fem_reference.assessment.credibility import Beside, Credibility, Row, count, of_arms, reached
 from fem_reference.assessment.experiments import Experiment, experiments
 from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
 from fem_reference.report.pages import Page
 
+COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case goes through
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
     "indicative": "within what single specimens, quotations or memory say",
@@ -33,6 +34,9 @@ def page(found: Credibility) -> Page:
             (fit.law, one.name): met(fit.values, one) for fit in found.fits for row in found.rows for one in row.beside
         },
         "records": _records(found),
+        "differences": {row.claim.name: differences(row, found.arms) for row in found.rows},
+        "specimens": {row.claim.name: specimens(row) for row in found.rows},
+        "source": source,
         "drawings": [_drawing(one) for one in found.arms],
     }
     return Page("credibility", "Credibility", (("", "", said(found)),), "credibility_page.html", contents, facts(found))
@@ -59,6 +63,47 @@ def met(values: Mapping[str, float], one: Beside) -> bool | None:
     return abs(values[one.name] - one.truth) <= one.within if one.name in values else None
 
 
+def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
+    """How many measured numbers the model misses to either side, and how far: moment arms in mm, on the mean over the poses of each
+    case, else in uncertainties of the measurement; orders apart.
+    """
+    own = [one for one in row.beside if one.kind == "measurement"]
+    orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
+    missed = [(one.value - one.truth) / one.within for one in numbers if not one.met]
+    unit = "times the uncertainty"
+    if row.claim.arms:
+        missed, unit = [one.bias for one in arms if one.kind == "measurement" and not of_arms(one).met], "mm"
+    great, small = ([side * far for far in missed if side * far > 0] for side in (1, -1))
+    said = [
+        f"{len(far)} too {word}, by {_span(far)} {unit}" for word, far in (("great", great), ("small", small)) if far
+    ]
+    if lost := sum(map(math.isnan, missed)):
+        said.append(f"{lost} without a number")
+    if orders:
+        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} orders wrong")
+    return "; ".join(said)
+
+
+def _span(values: list[float]) -> str:
+    low, high = (f"{end:.2g}" for end in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+def specimens(row: Row) -> str:
+    """The number of specimens by source of the measurements."""
+    known = {one.experiment: one.n for one in row.beside if one.kind == "measurement"}
+    return ", ".join(f"{source(name)}: {n or 'not known'}" for name, n in known.items())
+
+
+def source(experiment: str) -> str:
+    """An experiment's author and year.
+
+    >>> source("van_loocke_2006")
+    'Van Loocke 2006'
+    """
+    return experiment.replace("_", " ").title()
+
+
 def _records(found: Credibility) -> dict[str, Experiment]:
     """The records of all experiments, those first of which a comparison bears the name."""
     return dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {}
@@ -75,6 +120,9 @@ def facts(found: Credibility) -> dict[str, Any]:
             "other_codes": row.claim.other_codes,
             "bar": row.claim.bar,
             "band": [f"{one.value:g} {one.unit}" for one in row.band],
+            "differences": differences(row, found.arms),
+            "specimens": specimens(row),
+            **{name: finite(getattr(row, name)) for name in ("bias", "scatter")},
             **{
                 kind: dict(zip(("met", "of"), count(row.beside, kind), strict=True))
                 for kind in ("measurement", "model")
@@ -88,6 +136,9 @@ def facts(found: Credibility) -> dict[str, Any]:
             **{name: getattr(one, name) for name in ("case", "muscle", "sense", "experiment", "kind", "setting")},
             **{name: finite(getattr(one, name)) for name in ("share", "bias", "scatter", "coarser")},
             "poses": one.known,
+            "angles": [float(angle) for angle in one.found.angles[[0, -1]]],
+            "reached": reached(one),
+            "common": finite(one.between(*COMMON).share),
         }
         for one in found.arms
     ]

@@ -49,6 +49,7 @@ def sentences(found: Uncertainty) -> list[str]:
         ("inside", "Candidates whose surface errs less than the unknown parameters move it: {}."),
         ("undecided", "Candidates too near to the edge of the band to say, with the error bar of the reference: {}."),
         ("outside", "Candidates whose surface errs more than the unknown parameters move it: {}."),
+        ("no answer", "Candidates without an answer in some frame: {}."),
     ):
         named = [name for name, one in places.items() if one == word]
         said += [text.format(listed(named))] if named else []
@@ -86,10 +87,9 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
         return "\N{EN DASH}", ""
     frames = [place for place in one.places if place]
     share = f"{frames.count('inside')} of {len(frames)} frames inside"
-    if not one.worst > 0:
-        return one.word, share
-    far = "not a number" if math.isinf(one.worst) else f"up to {number(one.worst)} {unit} beyond"
-    return one.word, f"{share}, {far}"
+    lost = f", {count} without an answer" if (count := frames.count("no answer")) else ""
+    far = f", up to {number(one.worst)} {unit} beyond" if one.worst > 0 else ""
+    return one.word, f"{share}{lost}{far}"
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:

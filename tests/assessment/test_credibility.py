@@ -96,6 +96,16 @@ def test_what_is_quoted_remembered_or_unknown_never_validates(known, from_memory
     assert of_result(measured(1.02)).validates
 
 
+def test_what_a_comparison_rests_on_is_said() -> None:
+    """The worst text that one of its numbers was read in; a tolerance where one has no deviation, but not of an order."""
+    assert of_result(measured(1.0)).rests_on == "abstract"
+    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; a part of the model from memory"
+    assert of_result(measured(1.0, known=(*SARCOMERES, *QUOTED))).rests_on == "quotation; ± chosen by us"
+    assert of_result(measured(1.0, known=QUOTED, is_order=True)).rests_on == "quotation"
+    assert of_result(measured(1.0, known=())).rests_on == "not known; ± chosen by us"
+    assert [of_result(measured(1.0, known=known)).experiment for known in (QUOTED, ())] == ["van_loocke_2006", ""]
+
+
 def test_neither_a_number_nor_a_word_of_a_source_is_a_mode() -> None:
     """A ratio of 1 known to a half is a number, and a source may bear the word memory."""
     one = of_result(measured(1.25, within=0.5, source="A memory of muscles"))
@@ -220,7 +230,10 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
     (said,) = [line for line in text.splitlines() if "mean stress along the fibres" in line]
     assert f"{value} ± {bar} kPa" in said
     assert f"`{where}`" in said
-    assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {"by --error-bar, by case"}
+    assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {
+        "by --error-bar, by case",
+        "none: cubes are homogeneous",
+    }
 
 
 def test_parameters_are_inside_only_where_all_ranges_say_so() -> None:

@@ -47,9 +47,13 @@ def test_nearer_than_most_runs_is_inside_a_band_of_distances() -> None:
 
 
 def test_what_is_not_a_number_is_never_inside() -> None:
-    found = place("c", band(), np.array([1.5, NAN, 1.5, 1.5]))
-    assert found.places == ("inside", "outside", "inside", "")
-    assert found.worst == np.inf
+    found = place("c", band(), np.array([1.5, NAN, 2.3, 1.5]))
+    assert found.places == ("inside", "no answer", "outside", "")
+    assert (found.word, found.share, found.worst) == ("no answer", pytest.approx(1 / 3), pytest.approx(0.3, abs=1e-5))
+    none = place("c", band(distance=True), np.array([NAN, np.inf, -np.inf, NAN]))
+    assert none.places == ("no answer", "no answer", "no answer", "")
+    assert (none.share, np.isnan(none.worst)) == (0.0, True)
+    assert place("c", band(bar=None), np.full(4, NAN)).word == "no answer"
     assert {*place("c", band(bar=NAN), np.full(4, 1.5)).places} == {"undecided", ""}
     assert {*place("c", band(bar=None), np.full(4, 1.5)).places} == {"undecided", ""}
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from fem_reference import report
+from fem_reference.assessment.credibility import of_result
 from fem_reference.assessment.experiments import experiments
 from fem_reference.assessment.moment_arms import ArmRange
 from fem_reference.report import credibility_page
-from tests.assessment.test_credibility import arms, found
+from tests.assessment.test_credibility import QUOTED, arms, found, graded, measured
 
 
 def test_the_page_and_its_numbers(tmp_path) -> None:
@@ -57,6 +58,35 @@ def test_measurements_and_other_models_are_counted_apart(tmp_path) -> None:
     assert "converged in 9 evaluations from one start" in text
 
 
+def test_each_difference_has_its_direction_and_orders_stand_apart() -> None:
+    """Around 1 +- 0.1: 1.5 and 1.8 are 5 and 8 uncertainties above, 0.7 is 3 below; what is within has no direction."""
+    values = {"a": 1.02, "b": 1.5, "c": 1.8, "d": 0.7, "e": np.nan}
+    numbers = [replace(of_result(measured(value)), name=name) for name, value in values.items()]
+    order = of_result(measured(0.0, truth=1.0, within=0.5, is_order=True))
+    said = credibility_page.differences(graded(*numbers, order), ()).split("; ")
+    assert said[0] == "2 too great, by 5 to 8 times the uncertainty"
+    assert said[1:] == ["1 too small, by 3 times the uncertainty", "1 without a number", "1 of 1 orders wrong"]
+    assert credibility_page.differences(graded(numbers[0]), ()) == ""
+
+
+def test_specimens_are_counted_by_source() -> None:
+    row = graded(of_result(measured(1.0)), of_result(measured(1.0, known=QUOTED)))
+    assert credibility_page.specimens(row) == "Chen 2016: 6, Van Loocke 2006: not known"
+
+
+def test_arms_have_what_others_reach_and_the_poses_that_all_cases_have() -> None:
+    """Inside up to 10 of -10 to 70 degrees: 11 of 41 poses in steps of 2 degrees, and 6 of the 29 from 0 to 57."""
+    at, made = np.arange(-10.0, 71.0, 2.0), arms(10, 20, (15, 15))
+    ends = (np.full(41, one) for one in (10.0, 20.0))
+    published = np.where(at <= 10, 15.0, 25.0)
+    wide = replace(
+        made, found=ArmRange(at, *ends), middle=np.full(41, 15.0), published=ArmRange(at, published, published)
+    )
+    (one,) = credibility_page.facts(replace(found(), rows=(), arms=(wide,)))["arms"]
+    assert (one["angles"], one["reached"]) == ([-10, 70], 91)
+    assert (one["share"], one["common"]) == (11 / 41, 6 / 29)
+
+
 def test_poses_are_those_in_which_the_published_arm_is_known() -> None:
     made = arms(10, 20, (15, 15))
     published = np.where(made.found.angles < 6, 15.0, np.nan)
@@ -66,10 +96,10 @@ def test_poses_are_those_in_which_the_published_arm_is_known() -> None:
 
 def test_the_row_of_arms_has_the_range_of_biases_and_each_case_stands_below_once(tmp_path) -> None:
     """One sentence for all measured cases: seven of them in a narrow cell made the first table four times as tall."""
-    several = (arms(10, 20, (15, 15)), arms(10, 20, (18, 18)), arms(10, 20, (40, 60), "iliacus"))
+    several = (arms(10, 20, (15, 15)), arms(10, 20, (28, 28)), arms(10, 20, (40, 60), "iliacus"))
     page = credibility_page.page(replace(found(), arms=several))
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text()).replace("\u202f", " ")
-    assert "bias -3.0 to 0.0 mm beside measurements" in text
+    assert "2 of 3 measurements within; 1 too small, by 13 mm; 0 of 1 other models" in text
     assert text.count("bias 0.0 mm, scatter 0.0 mm over the 10 of 10 poses") == 1
 
 

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
-from fem_reference.assessment.uncertainty import Failure
+import numpy as np
+
+from fem_reference.assessment.uncertainty import Failure, place
 from fem_reference.report import uncertainty_page
 from tests.assessment.test_uncertainty import band, study
 
@@ -19,6 +21,14 @@ def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> N
     assert inside == "Candidates whose surface errs less than the unknown parameters move it: fast."
     assert undecided.endswith("with the error bar of the reference: near.")
     assert outside == "Candidates whose surface errs more than the unknown parameters move it: far."
+
+
+def test_a_candidate_without_an_answer_is_not_called_outside() -> None:
+    values = np.array([1.5, np.nan, 2.3, np.nan])
+    found = replace(study(SURFACE), placed=(place("lost", SURFACE, values),))
+    assert uncertainty_page.sentences(found)[1:] == ["Candidates without an answer in some frame: lost."]
+    text = uncertainty_page.page(found).html()
+    assert "no answer<small>1 of 3 frames inside, 1 without an answer, up to 0.300 mm beyond</small>" in text
 
 
 def test_the_page_shows_ranges_with_source_and_what_was_not_varied() -> None:
