@@ -29,6 +29,7 @@ from fem_reference.foundations.subprocesses import command
 
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST = 3600.0  # [s] that the tests of a fault may take
+_NO_END = "no end"
 LIST, RECORD = (Path(__file__).with_suffix(end) for end in (".toml", ".json"))
 
 
@@ -109,8 +110,8 @@ def plant(fault: Fault, copy: Path) -> tuple[str, str]:
 
 
 def failing(copy: Path, *chosen: str) -> tuple[str, str]:
-    """The first of the ``chosen`` tests in ``copy`` that fails, empty where none does, and the last line that was printed. No
-    process that they start goes on after them.
+    """The first of the ``chosen`` tests in ``copy`` that fails, empty where all pass, ``_NO_END`` where they do not get so far; and
+    the last line that was printed. No process that they start goes on after them.
     """
     words = ["-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", *chosen]
     settings = {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
@@ -129,8 +130,9 @@ def failing(copy: Path, *chosen: str) -> tuple[str, str]:
             tests.wait()
         said.seek(0)
         lines = said.read().strip().splitlines() or ["nothing said"]
-    found = [match[1] for line in lines if (match := re.match(r"(?:FAILED|ERROR) (\S+)", line))]
-    return found[0] if found and tests.returncode == 1 else "", lines[-1]
+    found = [match[1] for line in lines if (match := re.match(r"(?:FAILED|ERROR) (.+?)(?: - |$)", line))]
+    passed = tests.returncode in (0, 5)  # 5: none of this marker
+    return "" if passed else (found or [_NO_END])[0], lines[-1]
 
 
 def main() -> int:

@@ -157,7 +157,8 @@ def _on(
             key = measured.key(one)
             old = known.get(name)
             if old is not None:
-                old = old.model_copy(update={"stale": not old.is_of(measured.truth, key)})
+                limited = old.time_limit in (None, bench.time_limit)
+                old = old.model_copy(update={"stale": not (limited and old.is_of(measured.truth, key))})
             if old is not None and not old.asked(only):
                 yield old
                 continue
@@ -192,25 +193,29 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run of this ``key``."""
+        """The row of a run of this ``key``; late where it took more than the time limit, also in the store of another limit."""
         own = run is self.reference
+        submitted = one.candidate.solver == "recorded"  # its time is of another machine
+        limit = None if own or submitted else self.bench.time_limit
+        late = limit is not None and run.outcome.cost.get("seconds_processor", 0.0) > limit
+        status = "timed out" if late and run.outcome.status == "converged" else run.outcome.status
         worst = {} if own else cost.greatest(run, self.reference, self.context, _METRICS)
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
-        submitted = one.candidate.solver == "recorded"  # its time is of another machine
-        error, time = worst.get(ERROR, np.nan), np.nan if seconds is None or submitted or why else seconds
+        unranked = seconds is None or submitted or why or late
+        error, time = worst.get(ERROR, np.nan), np.nan if unranked else seconds
         return Standing(
             case=self.bench.scene.name,
             group=one.group,
             name=run.name,
             version=one.version,
-            status=run.outcome.status,
+            status=status,
             message=run.outcome.message,
             unsound=why,
             seconds_per_frame=seconds,
             worst={name: value if np.isfinite(value) else None for name, value in worst.items()},
             bars=cost.known(refinement.stored(run)) if own else {},
             from_rest=_from_rest(run, self.reference),
-            split={} if why or own else self._split(one, run),
+            split={} if why or own or late else self._split(one, run),
             least_error=error if np.isfinite(error) and time <= MATCHED_TIME else None,
             least_time=time if np.isfinite(time) and error <= MATCHED_ERROR else None,
             truth=self.truth,
@@ -219,7 +224,7 @@ class _Measured:
             date=datetime.now(UTC).strftime("%Y-%m-%d"),
             machine=THEIRS if submitted else str(run.origin.get("machine", machine())),
             protocol=PROTOCOL,
-            time_limit=None if own or submitted else self.bench.time_limit,
+            time_limit=limit,
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:

@@ -248,3 +248,12 @@ def test_a_solver_over_the_time_limit_is_named_and_not_ranked(monkeypatch) -> No
     page = Path("reports/standings.html").read_text()
     assert page.count("not within 0.3 s: ") == 2
     assert "Each solver may take 0.3 s of processor time" in page
+
+
+@pytest.mark.usefixtures("place")
+def test_a_stored_run_that_took_more_than_the_limit_of_now_is_late_too() -> None:
+    before = {row["name"]: row for row in stand("--program", "still", "--time-limit", "100 s")["rows"]}
+    assert (before["still"]["status"], before["still"]["least_error"]) == ("converged", pytest.approx(0.2))
+    after = {row["name"]: row for row in stand("--program", "still", "--time-limit", "1 ms", "--only", "stale")["rows"]}
+    assert after["still"]["run"] == before["still"]["run"]  # Python starts in more than 1 ms
+    assert (after["still"]["status"], after["still"]["least_error"]) == ("timed out", None)
