@@ -172,10 +172,10 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """Where ``facts`` were read, by the worst; a tolerance without a deviation, and a model from memory."""
+    """The worst text in which ``facts`` were read; a tolerance without a deviation, and a model, not the DOI alone, from memory."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
-    remembered = from_memory and read != "memory"
+    remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
     return f"{read}{'; ± chosen by us' if chosen else ''}{'; a part of the model from memory' if remembered else ''}"
 
 

@@ -64,13 +64,13 @@ def met(values: Mapping[str, float], one: Beside) -> bool | None:
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """How many measured numbers the model misses to either side, and how far: moment arms in mm, on the mean over the poses of each
-    case, else in uncertainties of the measurement; orders apart.
+    """The count of measured numbers that the model misses to either side, and its distances: of moment arms in mm, on the mean over
+    the poses of each case, else in uncertainties of the measurement; orders apart.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
     missed = [(one.value - one.truth) / one.within for one in numbers if not one.met]
-    unit = "times the uncertainty"
+    unit = "uncertainties"
     if row.claim.arms:
         missed, unit = [one.bias for one in arms if one.kind == "measurement" and not of_arms(one).met], "mm"
     great, small = ([side * far for far in missed if side * far > 0] for side in (1, -1))

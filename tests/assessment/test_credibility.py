@@ -101,6 +101,9 @@ def test_what_a_comparison_rests_on_is_said() -> None:
     assert of_result(measured(1.0)).rests_on == "abstract"
     assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; a part of the model from memory"
     assert of_result(measured(1.0, known=(*SARCOMERES, *QUOTED))).rests_on == "quotation; ± chosen by us"
+    assert of_result(measured(1.0, known=QUOTED, from_memory=True)).rests_on == "quotation; ± chosen by us", (
+        "of the DOI"
+    )
     assert of_result(measured(1.0, known=QUOTED, is_order=True)).rests_on == "quotation"
     assert of_result(measured(1.0, known=())).rests_on == "not known; ± chosen by us"
     assert [of_result(measured(1.0, known=known)).experiment for known in (QUOTED, ())] == ["van_loocke_2006", ""]

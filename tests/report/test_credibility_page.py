@@ -54,7 +54,7 @@ def test_measurements_and_other_models_are_counted_apart(tmp_path) -> None:
     assert (row["measurement"], row["model"]) == ({"met": 2, "of": 3}, {"met": 0, "of": 1})
     assert [one["kind"] for one in row["beside"]] == ["measurement"] * 3 + ["model"]
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text())
-    assert "2 of 3 measurements within; 0 of 1 other models as near as asked for" in text
+    assert "2 of 3 measurements within their uncertainty; 0 of 1 other models as near as asked for" in text
     assert "converged in 9 evaluations from one start" in text
 
 
@@ -64,8 +64,8 @@ def test_each_difference_has_its_direction_and_orders_stand_apart() -> None:
     numbers = [replace(of_result(measured(value)), name=name) for name, value in values.items()]
     order = of_result(measured(0.0, truth=1.0, within=0.5, is_order=True))
     said = credibility_page.differences(graded(*numbers, order), ()).split("; ")
-    assert said[0] == "2 too great, by 5 to 8 times the uncertainty"
-    assert said[1:] == ["1 too small, by 3 times the uncertainty", "1 without a number", "1 of 1 orders wrong"]
+    assert said[0] == "2 too great, by 5 to 8 uncertainties"
+    assert said[1:] == ["1 too small, by 3 uncertainties", "1 without a number", "1 of 1 orders wrong"]
     assert credibility_page.differences(graded(numbers[0]), ()) == ""
 
 
@@ -99,7 +99,7 @@ def test_the_row_of_arms_has_the_range_of_biases_and_each_case_stands_below_once
     several = (arms(10, 20, (15, 15)), arms(10, 20, (28, 28)), arms(10, 20, (40, 60), "iliacus"))
     page = credibility_page.page(replace(found(), arms=several))
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text()).replace("\u202f", " ")
-    assert "2 of 3 measurements within; 1 too small, by 13 mm; 0 of 1 other models" in text
+    assert "2 of 3 measurements within their uncertainty; 1 too small, by 13 mm; 0 of 1 other models" in text
     assert text.count("bias 0.0 mm, scatter 0.0 mm over the 10 of 10 poses") == 1
 
 
