@@ -72,7 +72,7 @@ Settled = tuple[Floats, Met | None]
 
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: those of the force on the side and of the one on the other.
+    ``names``: those of both parts.
     """
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
