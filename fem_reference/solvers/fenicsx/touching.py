@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_array
 
-from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.overlaps import beyond_rim, overlap
 from fem_reference.solvers.common.state_checks import Trouble
@@ -86,7 +86,7 @@ class TouchingForces:
         for (law, one, other), around in zip(sides, skins, strict=True):
             felt = np.concatenate([form.regions[other], around]) if law.around and len(around) else None
             skin = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
-            passes.append(Pass(law, own[one], skin, law.forces if one == law.one else law.forces[::-1]))
+            passes.append(Pass(law, own[one], skin, (one, other)))
             ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
             rims.append(None if ends is None else Pass(law, own[one], ends, (one, other)))
         return passes, rims
@@ -142,8 +142,11 @@ class TouchingForces:
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
             if one.own is not None:  # of a part on itself: none in all
                 continue
-            forces = contact.forces[:, None] * met.there.normal  # on the points
-            for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
+            forces, (here, there) = contact.forces[:, None] * met.there.normal, one.names  # on the points
+            for sign, name, places in (
+                (1, f"{there} on {here}", met.here.point),
+                (-1, f"{here} on {there}", met.there.point),
+            ):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
@@ -213,15 +216,24 @@ class TouchingForces:
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
-            lost, how = one.through(before, last, self.seen, met), "went through the other side"
+            own, other = (f'"{name}"' for name in one.names)
+            lost, way = one.through(before, last, self.seen, met), f"went through the other side, {other}"
             if rim and not len(lost):
-                lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
+                lost = rim.slid(self.seen, last.points, met.points)
+                way = f"slid past the rim of {other}, at a gap of {_gap(rim, self.seen, lost)} mm to the skin there"
             if rubbed and not len(lost):
-                lost, how = met.points[rubbed.far > _FAR], "slid farther than a facet within a load step"
+                lost, way = met.points[rubbed.far > _FAR], f"slid on {other} farther than a facet within a load step"
             if len(lost):
-                where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
-                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")
+                rest, now = (place_of(one.places(at)[lost[0]]) for at in (np.zeros_like(before), self.seen))
+                where = f"a point of {own} that rests at {rest} and would be at {now}"
+                return Trouble("diverged", f"contact gives way: {where} {way}")
         return None
+
+
+def _gap(rim: Pass, unknowns: Floats, points: Ints) -> str:
+    """The gap [mm] of the first of the ``points`` (n,) that slid past a ``rim``, negative inside; nothing without points."""
+    near = rim.met(unknowns, rim.law.smoothing)
+    return ", ".join(f"{gap:.2g}" for gap in near.gap[np.isin(near.points, points[:1])])
 
 
 def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:

@@ -72,7 +72,7 @@ Settled = tuple[Floats, Met | None]
 
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: those of the force on the side and of the one on the other.
+    ``names``: those of both parts.
     """
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
@@ -252,11 +252,6 @@ class Pass:
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
-        travel = ends[near.points] - starts[near.points] + near.there.point
-        travel -= self.other.places(new, near.facets, near.there.at).point
-        free[near.points[(gap > 0) & (np.linalg.norm(travel, axis=1) < near.gap)]] = (
-            False  # flat pieces of a facet that bends
-        )
         free[near.points[near.gap <= 0]] = free[last.points[last.gap <= 0]] = False
         return np.union1d(behind, self._passed(starts, ends, old, new, free))
 
@@ -285,7 +280,10 @@ class Pass:
             pieces = self.pieces[facets[part]]
             which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
             corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
-            lost.append(points[passed(starts[points], ends[points], *corners)])
+            found = passed(starts[points], ends[points], *corners)
+            pair = part[found.reshape(pieces.shape[:2]).any(axis=1)]
+            who, paths = some[pair], np.stack([starts, ends])[:, some[pair]]
+            lost.append(who[~self.other.keep_away(old, new, facets[pair], paths)])
         return np.unique(np.concatenate(lost))
 
 

@@ -122,3 +122,33 @@ def test_forces_at_edges_are_the_slope_of_their_energy_and_the_tangent_theirs(el
     assert (after - before) / (2 * step) == pytest.approx(forces @ direction, abs=1e-10)
     assert (above - below) / (2 * step) == pytest.approx(tangent @ direction, abs=1e-8)
     assert abs(tangent - tangent.T).max() < 1e-14
+
+
+def lost(element: str, x: tuple[float, float], z: tuple[float, float], bend: float = 0.0) -> np.ndarray:
+    """True for each point of the small block that went through in a load step, in which the middle of its lower face goes along
+    ``x`` and ``z``, over a flat top of which both halves sag by ``bend``.
+    """
+    contact, upper = valley(element)
+    unknowns, one = contact.unknowns.x.array, contact.passes[1]
+    across = one.other.rest[..., 0]
+    share = 2 * np.where(across < 0.5, across, across - 0.5)
+    unknowns[one.other.dofs[..., 2]] = -np.abs(across - 0.5) - 4 * bend * share * (1 - share)
+    unknowns[upper] = [x[0] - 0.5, 0.0, z[0] - 1.5]
+    contact.settle()
+    before, last, unknowns[upper] = np.array(unknowns), contact.now[1][0], [x[1] - 0.5, 0.0, z[1] - 1.5]
+    contact.look()
+    return np.isin(np.arange(len(one.areas)), one.through(before, last, contact.seen, contact.now[1][0]))
+
+
+@pytest.mark.parametrize("element", ["P2/P1", "Q2/Q1"])
+def test_a_point_that_stays_in_front_of_a_bent_facet_is_not_refused(element) -> None:
+    # At x = 0.125 the facet is at 0.5 - 3/4 0.2 = 0.35, and flat pieces between its nodes at 0.4.
+    assert not lost(element, (0.125, 0.125), (0.43, 0.39), 0.2).any()
+    assert lost(element, (0.125, 0.125), (0.43, -0.7), 0.2).all()
+
+
+@pytest.mark.parametrize("element", ["P1/P1", "P2/P1", "Q1/P0", "Q2/Q1"])
+@pytest.mark.parametrize("end", [0.25, 0.85])
+def test_a_point_that_goes_through_is_found_also_where_it_moves_along(element, end) -> None:
+    # Deeper than facets reach: at most 5/4 of the distance of 0.75 of their corners from their middles.
+    assert lost(element, (0.25, end), (0.55, -0.7)).all()
