@@ -24,7 +24,7 @@ class Standing(Record):
     reference is back at rest. ``unsound``: why its frames are no answer. ``split``: by part the root mean square [mm] of its error.
     ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
     ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
-    True where case, reference, solver, protocol or time limit changed since; ``time_limit``: the processor time [s] that it was given.
+    True where case, reference, solver, protocol or time limit changed since; ``time_limit``: its processor time [s] at most.
     """
 
     case: str

@@ -62,7 +62,7 @@ def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
 def imported(path: Path, package: Path) -> tuple[str, ...]:
     """Names that the file at ``path`` imports from ``package``: modules, and what may be modules, without the package's name."""
     start, found = f"{package.name}.", list[str]()
-    for node in ast.parse(b"\n".join(_IMPORT.findall(path.read_bytes()))).body:
+    for node in ast.walk(_tree(path.read_bytes())):
         if isinstance(node, ast.Import):
             found += [alias.name.removeprefix(start) for alias in node.names if alias.name.startswith(start)]
         elif isinstance(node, ast.ImportFrom):
@@ -73,6 +73,14 @@ def imported(path: Path, package: Path) -> tuple[str, ...]:
                 inside = whole.removeprefix(package.name).removeprefix(".")
                 found += [inside, *(f"{inside}.{alias.name}".lstrip(".") for alias in node.names)]
     return tuple(found)
+
+
+def _tree(source: bytes) -> ast.AST:
+    """The imports of a ``source``; all of it where what looks like an import is none."""
+    try:
+        return ast.parse(b"\n".join(_IMPORT.findall(source)))
+    except SyntaxError:
+        return ast.parse(source)
 
 
 def machine() -> str:
