@@ -165,15 +165,18 @@ def fan(points: Floats) -> Surface:
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
     """Landmarks [mm] by cloud, from rows ``cloud,landmark,x,y,z`` below a header row."""
     clouds: dict[str, list[list[float]]] = {}
-    for number, row in enumerate(files.read_rows(path)[1:], start=2):
+    for number, row in enumerate(files.read_rows(path), start=1):
         try:
             cloud, _, *coordinates = row
-            x, y, z = (float(text) * unit for text in coordinates)
+            place = [float(text) * unit for text in coordinates]
         except ValueError:
-            x = y = z = np.nan
-        if not np.isfinite([x, y, z]).all():
+            place = []
+        if number == 1 and place:
+            raise InputError(f"{path}: row 1", f'"{",".join(row)}"', "a header row: cloud,landmark,x,y,z")
+        if number > 1 and not (len(place) == 3 and np.isfinite(place).all()):
             raise InputError(f"{path}: row {number}", f'"{",".join(row)}"', "cloud, landmark and three coordinates")
-        clouds.setdefault(cloud, []).append([x, y, z])
+        if place:
+            clouds.setdefault(cloud, []).append(place)
     return clouds
 
 

@@ -62,7 +62,7 @@ def test_a_fusiform_body_is_measured_by_phase(monkeypatch) -> None:
     found = made.setup_cache()
     costs = {cost: made.track_cost(found, "Q1/P0", cost) for cost in reference.COSTS}
     assert all(value >= 0 for value in costs.values())
-    assert costs["seconds_solve"] >= costs["seconds_assembly"] > 0
+    assert costs["seconds_solve"] > 0 < costs["seconds_assembly"]
     timed = reference.Interleaved()
     timed.setup("Q1/P0")
     before = reference.processor()

@@ -191,6 +191,7 @@ def test_two_clouds_are_two_patches(tmp_path: Path) -> None:
         (_marks(np.eye(3)) + "\nA,4,0,nan,1", r'marks.csv: row 5: got "A,4,0,nan,1", want cloud, landmark and three'),
         (_marks(np.eye(3)) + "\nA,4,0,1", r'marks.csv: row 5: got "A,4,0,1"'),
         (_marks(np.eye(3)) + "\nA", r'marks.csv: row 5: got "A"'),
+        (_marks(np.eye(4, 3)).split("\n", 1)[1], r"marks.csv: row 1: got .*, want a header row: cloud,landmark,x,y,z"),
         (_marks(np.eye(3)) + "\nA,4,0,east,1", r'marks.csv: row 5: got "A,4,0,east,1"'),
     ],
 )
