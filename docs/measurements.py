@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from statistics import mean, median, pstdev
+from statistics import median
 from typing import Any, NamedTuple
 
-from fem_reference.assessment import cost_study, credibility, fronts
+from fem_reference.assessment import cost_study, credibility, experiments, fronts
 from fem_reference.assessment.catalogue import Entry
 from fem_reference.assessment.recommendation import TIME
 from fem_reference.assessment.stress import VERDICTS
 from fem_reference.foundations.records import parse
+from fem_reference.report import credibility_page
 from fem_reference.verification import muscle_bodies, runner
 
 KEPT = Path(__file__).parent / "measured"
@@ -25,6 +26,8 @@ _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 # Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
 _FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
+_BESIDE = ("measurement", "model")
+_RESTS = "the measured number rests on"
 _ARMS = ("mean", "least", "greatest")
 # Frames of a hip that turns from rest to -0.3 rad and on to 0.3 rad, a hundredth of a radian a frame.
 _POSES = {30: "at -17 degrees", 60: "at rest", 90: "at 17 degrees"}
@@ -84,12 +87,15 @@ def _bodies(found: dict[str, Any]) -> Any:
 
 def _bodies_rows() -> str:
     """By entry the value, that of the coarser mesh with half the load steps, and the measured one."""
-    rows = []
+    rows, several = [], (row["beside"] for row in kept("credibility")["measured"]["rows"])
+    beside = {one["name"]: one for own in several for one in own}
     for one in kept("bodies")["measured"]:
         title = next(each.title for each in muscle_bodies.ENTRIES if each.name == one["name"])
         measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
-        rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, one["verdict"]))
-    return table("bodies", ("", "shipped material", "on cells twice as large, in half the steps", "measured", ""), rows)
+        said = _where(beside[one["name"]]), _rests(beside[one["name"]])
+        rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
+    head = ("", "shipped material", "on cells twice as large, in half the steps", "measured", "", _RESTS)
+    return table("bodies", head, rows)
 
 
 def _verify_groups() -> str:
@@ -140,10 +146,23 @@ def _comparison_worst() -> str:
 
 
 def _credibility(found: dict[str, Any]) -> Any:
-    keys = ("name", "title", "unit", "value", "truth", "within", "n", "met", "validates", "kind", "is_order")
+    keys = (
+        "name",
+        "title",
+        "unit",
+        "value",
+        "truth",
+        "within",
+        "n",
+        "met",
+        "kind",
+        "is_order",
+        "experiment",
+        "rests_on",
+    )
+    own = ("quantity", "grade", "bar", "band", "measurement", "model", "differences", "specimens", "bias", "scatter")
     rows = [
-        {key: row[key] for key in ("quantity", "grade", "bar", "band", "measurement", "model")}
-        | {"beside": [{key: one[key] for key in keys} for one in row["beside"]]}
+        {key: row[key] for key in own} | {"beside": [{key: one[key] for key in keys} for one in row["beside"]]}
         for row in found["rows"]
     ]
     fits = [
@@ -154,28 +173,32 @@ def _credibility(found: dict[str, Any]) -> Any:
 
 
 def _credibility_grades() -> str:
-    """By quantity all evidence: what verifies it by the catalogue as it is, the rest as it was measured."""
-    measured, groups = kept("credibility")["measured"], list(runner.entries().values())
+    """By quantity what measurements of muscle say."""
     rows = []
-    for one, claim in zip(measured["rows"], credibility.claims(), strict=True):
+    for one, claim in zip(kept("credibility")["measured"]["rows"], credibility.claims(), strict=True):
+        met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
+        said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
+        rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
+    experiment = ("measurements within their uncertainty", "the others: the model's value is", "specimens, by source")
+    head = ("quantity", "grade", "compared", *experiment, "other models as near as asked for", "model band")
+    return table("credibility", head, rows)
+
+
+def _credibility_verified() -> str:
+    """By quantity what verifies it by the catalogue as it is."""
+    rows, groups = [], list(runner.entries().values())
+    for claim in credibility.claims():
         behind = credibility.verifying(claim, groups)
         kinds, orders = (", ".join(part) for part in (_kinds(behind), _orders(behind)))
         verified = f"{claim.closed_forms}; {kinds}" if kinds else claim.closed_forms
-        met = (
-            f"{found['met']} of {found['of']}" if found["of"] else "none"
-            for found in (one["measurement"], one["model"])
-        )
-        cells = (
-            verified,
-            orders or "none",
-            claim.other_codes,
-            *met,
-            _bias(one, measured["arms"] if claim.arms else []),
-        )
-        rows.append((one["quantity"], *cells, one["bar"], " to ".join(one["band"]) or "not known", one["grade"]))
-    verification = ("closed forms, and entries of the catalogue", "orders that must be met", "other codes")
-    experiment = ("measurements within their uncertainty", "other models as near as asked for", "bias and scatter")
-    head = ("quantity", *verification, *experiment, "numerical bar", "model band", "grade")
+        rows.append((claim.name, verified, orders or "none", claim.other_codes, claim.bar))
+    head = (
+        "quantity",
+        "closed forms, and entries of the catalogue",
+        "orders that must be met",
+        "other codes",
+        "numerical bar",
+    )
     return table("credibility", head, rows)
 
 
@@ -190,48 +213,71 @@ def _orders(behind: list[Entry]) -> list[str]:
     ]
 
 
-def _bias(row: dict[str, Any], arms: list[dict[str, Any]]) -> str:
-    """The bias and scatter of the model beside measurements and the scatter of these: of moment arms in mm by case, else in
-    uncertainties of the experiments, orders left out.
-    """
-    if arms:
-        own = [one for one in arms if one["kind"] == "measurement"]
-        words = [f"`{one['case']}` {one['bias']:.1f} and {one['scatter']:.1f} mm" for one in own]
-        return f"{', '.join(words)}; scatter of the experiment and n not published"
-    beside = [one for one in row["beside"] if one["kind"] == "measurement" and not one["is_order"]]
-    if not beside:
-        return "none"
-    off = [(one["value"] - one["truth"]) / one["within"] for one in beside]
-    known = sorted({str(one["n"]) for one in beside if one["n"]}) or ["not known"]
-    scatter = f"{pstdev(off):.2g}" if len(off) > 1 else "none"
-    return f"{mean(off):.2g} and {scatter} of their uncertainty, over {len(off)}; n {', '.join(known)}"
-
-
 def _credibility_cubes() -> str:
     measured = kept("credibility")["measured"]
     found = [each for row in measured["rows"] for each in row["beside"] if each["unit"] == "1"]
+    bodies = {one.name for one in muscle_bodies.ENTRIES}
     rows = []
-    for one in found:
+    for one in (one for one in found if one["name"] not in bodies):
         order = one["is_order"]
         cells = [fit["values"].get(one["name"], "") for fit in measured["fits"]]
         said = [("yes" if cell > 0.5 else "no") if order and cell != "" else cell for cell in (one["value"], *cells)]
         known = "yes" if order else f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = [number(cell) if isinstance(cell, float) else cell for cell in said]
-        rows.append((one["title"], said[0], known, "within" if one["met"] else "outside", *said[1:]))
+        rows.append((one["title"], said[0], known, _where(one), _rests(one), *said[1:]))
     laws = (
         f"{'best fit' if fit['converged'] else 'fit that did not converge'}: {fit['law']}" for fit in measured["fits"]
     )
-    return table("credibility", ("", "shipped material", "measured", "", *laws), rows)
+    return table("credibility", ("", "shipped material", "measured", "", _RESTS, *laws), rows)
+
+
+def _rests(one: dict[str, Any]) -> str:
+    return f"{credibility_page.source(one['experiment'])}: {one['rests_on']}"
+
+
+def _where(one: dict[str, Any]) -> str:
+    if one["met"] or one["is_order"]:
+        return "within" if one["met"] else "outside"
+    return f"outside: too {'great' if one['value'] > one['truth'] else 'small'}"
+
+
+def _credibility_sources() -> str:
+    """By source the specimens, and what of its measurements is within."""
+    found = [one for row in kept("credibility")["measured"]["rows"] for one in row["beside"]]
+    rows = []
+    for name, record in experiments.experiments().items():
+        own = [one for one in found if one["experiment"] == name and one["kind"] == "measurement"]
+        if own:
+            met, n = f"{sum(one['met'] for one in own)} of {len(own)}", own[0]["n"] or "not known"
+            rests = " / ".join(dict.fromkeys(one["rests_on"] for one in own))
+            rows.append((credibility_page.source(name), record.specimen, n, met, rests))
+    return table("credibility", ("source", "specimens", "n", "within", "its numbers rest on"), rows)
 
 
 def _credibility_arms() -> str:
     rows = []
     for one in kept("credibility")["measured"]["arms"]:
         offsets = (f"{one[key]:.1f} mm" for key in ("bias", "scatter", "coarser"))
-        beside = f"{one['experiment']} ({one['kind']})"
-        rows.append((f"`{one['case']}`", beside, f"{100 * one['share']:.0f} %", one["poses"], *offsets))
-    head = ("case", "beside", "inside, or covered", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
-    return table("credibility", head, rows)
+        beside = f"{credibility_page.source(one['experiment'])} ({one['kind']})"
+        asked = 100 if one["kind"] == "measurement" else one["reached"]
+        shares = (f"{100 * one[key]:.0f} %" for key in ("share", "common"))
+        first, last = one["angles"]
+        at = f"{first:.0f} to {last:.0f}"
+        rows.append(
+            (
+                f"`{one['case']}`",
+                beside,
+                *shares,
+                f"{asked:.0f} %",
+                f"{one['reached']:.0f} %",
+                at,
+                one["poses"],
+                *offsets,
+            )
+        )
+    shares = ("inside, or covered", "the same, 0 to 57 degrees", "asked for", "Modenese and Kohout's fibres")
+    poses = ("flexion, degrees", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
+    return table("credibility", ("case", "beside", *shares, *poses), rows)
 
 
 def _arms_about(found: dict[str, Any]) -> Any:
@@ -675,6 +721,8 @@ TABLES = {
     "uncertainty_iliacus_bands": partial(_uncertainty_bands, "uncertainty_iliacus"),
     "uncertainty_iliacus_candidates": partial(_uncertainty_candidates, "uncertainty_iliacus"),
     "credibility_grades": _credibility_grades,
+    "credibility_verified": _credibility_verified,
+    "credibility_sources": _credibility_sources,
     "credibility_cubes": _credibility_cubes,
     "credibility_arms": _credibility_arms,
     "arms_adduction": partial(_arms_about_rows, "arms_adduction"),
