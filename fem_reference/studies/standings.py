@@ -201,8 +201,8 @@ class _Measured:
         status = "timed out" if late and run.outcome.status == "converged" else run.outcome.status
         worst = {} if own else cost.greatest(run, self.reference, self.context, _METRICS)
         seconds, why = table_5_1.seconds_of(run), "" if own else unsound(run, self.reference)
-        unranked = seconds is None or submitted or why or late
-        error, time = worst.get(ERROR, np.nan), np.nan if unranked else seconds
+        error = worst.get(ERROR, np.nan)
+        time = np.nan if seconds is None or submitted or why or late else seconds
         return Standing(
             case=self.bench.scene.name,
             group=one.group,
