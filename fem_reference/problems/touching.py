@@ -21,8 +21,7 @@ class Touching:
     of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
     ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
     an overlap at rest is removed, as that with bones is; None: that of two parts presses at once, that of a part with itself never,
-    until it comes apart. ``around``: True where points of either part also feel the skin around the other, which has no points of
-    its own, as that of attachments; else a point that slides past the other's rim ends the run.
+    until it comes apart.
     """
 
     one: str
@@ -31,7 +30,6 @@ class Touching:
     smoothing: float
     friction: float | None = None
     relaxed: tuple[float, float] | None = None
-    around: bool = False
 
     @property
     def forces(self) -> tuple[str, str]:

@@ -5,7 +5,6 @@ from typing import Any
 
 import basix
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells
@@ -14,9 +13,6 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 _ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and those that places far beyond the edges get
 _LONGEST, _SMALL = 0.5, 1e-14  # steps of it, in reference coordinates
 _BALL = 1.25  # a facet is within so many times the distance of its farthest node from their mean
-
-# The greatest sum of the absolute values of functions of nodes, that of a triangle of degree 2.
-_SUM = 5 / 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +37,6 @@ class FacetPlaces:
 
     def __getitem__(self, some: Ints) -> "FacetPlaces":
         return FacetPlaces(*(getattr(self, column.name)[some] for column in fields(self)))
-
-    def replaced(self, some: Ints, others: "FacetPlaces") -> "FacetPlaces":
-        """These with ``others`` (k,) at the numbers ``some`` (k,)."""
-        found = self[np.arange(len(self.at))]
-        for column in fields(self):
-            getattr(found, column.name)[some] = getattr(others, column.name)
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,18 +93,6 @@ class Facets:
             at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
             going = going[(longest > _SMALL) & ((i < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]
         return self.places(nodes, which, at)
-
-    def keep_away(self, old: Floats, new: Floats, which: Ints, paths: Floats) -> NDArray[np.bool_]:
-        """True (n,) where points on straight ``paths`` (2, n, 3) [mm] surely stay in front of the facets ``which`` (n,), as their
-        nodes move from ``old`` to ``new`` (m, k, 3): relative to every place of the facet they move by less than their distance.
-        """
-        there = self.nearest(old, which, paths[0])
-        gap = np.vecdot(paths[0] - there.point, there.normal)
-        moves = (new - old)[which] - (paths[1] - paths[0])[:, None]
-        mean = moves.mean(axis=1)
-        spread = np.linalg.norm(moves - mean[:, None], axis=2).max(axis=1)
-        most = np.linalg.norm(mean, axis=1) + _SUM * spread
-        return np.asarray((most < gap) & (self.beyond(there.at) < _LONGEST))
 
     def beyond(self, at: Floats) -> Floats:
         """The distance (n,) of reference coordinates ``at`` (n, 2) from the reference facet, 0 inside it."""

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_array
 
-from fem_reference.foundations.mesh import Floats, Ints, place_of
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.overlaps import beyond_rim, overlap
 from fem_reference.solvers.common.state_checks import Trouble
@@ -23,8 +23,6 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
-# Searches in a load step after which a point that goes back and forth at a crease stays on its facet.
-_STRICT = 4
 # The unknowns (n,) of a search, what each pass met, its friction, and the shares of overlaps at rest that were subtracted.
 State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
@@ -36,12 +34,18 @@ class TouchingForces:
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
-        self.unknowns, self.spent = displacement.unknowns, spent
-        self.passes, self.rims = self._passes(body, form, displacement)
+        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
+        for law in body.touching:
+            names = dict.fromkeys((law.one, law.other))
+            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
+            low, high = parts[law.one], parts[law.other]
+            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
+            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
+        self.rims = self._rims(body, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
-        self.rubbed, self.dissipated, self.looks = list[Rubbed | None](), 0.0, 0
+        self.rubbed, self.dissipated = list[Rubbed | None](), 0.0
         self.settled: State = np.array(self.unknowns.x.array), [], [], []
         self.move_to(body.frames[0])
         self.settle()
@@ -73,32 +77,20 @@ class TouchingForces:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
-    @staticmethod
-    def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
-        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
-        its points may not touch, None where there is none, or where it is felt.
-        """
-        both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
-        sides = [(law, *pair) for law, pairs in both for pair in pairs]
-        skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
-        own = {name: facets_of(displacement, body.mesh, form.regions[name]) for _, name, _ in sides}
-        passes, rims = list[Pass](), list[Pass | None]()
-        for (law, one, other), around in zip(sides, skins, strict=True):
-            felt = np.concatenate([form.regions[other], around]) if law.around and len(around) else None
-            skin = own[other] if felt is None else facets_of(displacement, body.mesh, felt)
-            passes.append(Pass(law, own[one], skin, (one, other)))
-            ends = None if law.around or not len(around) else facets_of(displacement, body.mesh, around)
-            rims.append(None if ends is None else Pass(law, own[one], ends, (one, other)))
-        return passes, rims
+    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
+        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
+        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
+        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
+        return [
+            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
+            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
+        ]
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
-                self.looks += 1
-                for one in self.passes:
-                    one.strict = self.looks <= _STRICT
                 none = [None] * len(self.passes)
                 lasts, thens = ([met for met, _ in state] or none for state in (self.now, self.settled[1]))
                 columns = zip(self.passes, lasts, thens, strict=True)
@@ -142,11 +134,8 @@ class TouchingForces:
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
             if one.own is not None:  # of a part on itself: none in all
                 continue
-            forces, (here, there) = contact.forces[:, None] * met.there.normal, one.names  # on the points
-            for sign, name, places in (
-                (1, f"{there} on {here}", met.here.point),
-                (-1, f"{here} on {there}", met.there.point),
-            ):
+            forces = contact.forces[:, None] * met.there.normal  # on the points
+            for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
@@ -193,7 +182,7 @@ class TouchingForces:
             self.look()
         for side, (met, _) in zip(self.passes, self.now, strict=True):
             side.let_fall(met)
-        self.settled, self.looks = self.state, 0
+        self.settled = self.state
 
     @property
     def state(self) -> State:
@@ -206,7 +195,6 @@ class TouchingForces:
 
     def go_back(self, state: State | None = None) -> None:
         """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
-        self.looks = self.looks if state else 0
         self.seen, self.now, self.rubbed, shares = state or self.settled
         if shares != self.acting():  # its pressures are those of another frame
             self.seen = np.full_like(self.seen, np.nan)
@@ -216,24 +204,15 @@ class TouchingForces:
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
-            own, other = (f'"{name}"' for name in one.names)
-            lost, way = one.through(before, last, self.seen, met), f"went through the other side, {other}"
+            lost, how = one.through(before, last, self.seen, met), "went through the other side"
             if rim and not len(lost):
-                lost = rim.slid(self.seen, last.points, met.points)
-                way = f"slid past the rim of {other}, at a gap of {_gap(rim, self.seen, lost)} mm to the skin there"
+                lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
             if rubbed and not len(lost):
-                lost, way = met.points[rubbed.far > _FAR], f"slid on {other} farther than a facet within a load step"
+                lost, how = met.points[rubbed.far > _FAR], "slid farther than a facet within a load step"
             if len(lost):
-                rest, now = (place_of(one.places(at)[lost[0]]) for at in (np.zeros_like(before), self.seen))
-                where = f"a point of {own} that rests at {rest} and would be at {now}"
-                return Trouble("diverged", f"contact gives way: {where} {way}")
+                where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
+                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")
         return None
-
-
-def _gap(rim: Pass, unknowns: Floats, points: Ints) -> str:
-    """The gap [mm] of the first of the ``points`` (n,) that slid past a ``rim``, negative inside; nothing without points."""
-    near = rim.met(unknowns, rim.law.smoothing)
-    return ", ".join(f"{gap:.2g}" for gap in near.gap[np.isin(near.points, points[:1])])
 
 
 def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.passing import passed, seen_along
 from fem_reference.problems.touching import Touching
-from fem_reference.solvers.fenicsx.facet_edges import FacetEdges
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 from fem_reference.solvers.fenicsx.own_pairs import OwnPairs
 
@@ -19,10 +17,8 @@ _DEGREE = 8
 # points between the normals of two at their edge.
 _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges: where two facets meet at an angle, Newton's method would go
-# back and forth between them; where edges are felt, only if the pressure and its direction differ by no more than this share.
-_STAYS, _ALIKE = 0.05, 0.02
-# Places farther beyond the edges are only rough (``Facets.nearest``), and their edges are not asked.
-_ASKED = 0.5
+# back and forth between them.
+_STAYS = 0.05
 # Beyond a sharp edge a part faces another way: a point that slides off it there is free.
 _FACING = -0.5
 # Of a part with itself, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
@@ -34,8 +30,7 @@ _BULGE = 1.25  # a facet is as far from a plane as its farthest node times this,
 @dataclass(frozen=True, eq=False)
 class Met:
     """The n ``points`` of one side that are near the other: the places ``here`` on their own facets ``own`` (n,), the places
-    ``there`` on the ``facets`` (n,) they meet, the ``gap`` (n,) [mm] along the normal there, negative inside, and True ``on_edge``
-    (n,) where the place is on an edge of the facet or at a corner, as neither is the point above a facet nor inside below one.
+    ``there`` on the ``facets`` (n,) they meet, and the ``gap`` (n,) [mm] along the normal there, negative inside.
     """
 
     points: Ints
@@ -44,13 +39,11 @@ class Met:
     facets: Ints
     there: FacetPlaces
     gap: Floats
-    on_edge: NDArray[np.bool_]
 
     def some(self, which: Ints) -> "Met":
         """Those with the numbers ``which`` (k,)."""
         here, there = self.here[which], self.there[which]
-        on_edge = self.on_edge[which]
-        return Met(self.points[which], self.own[which], here, self.facets[which], there, self.gap[which], on_edge)
+        return Met(self.points[which], self.own[which], here, self.facets[which], there, self.gap[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +65,7 @@ Settled = tuple[Floats, Met | None]
 
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: those of both parts.
+    ``names``: those of the force on the side and of the one on the other.
     """
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
@@ -85,14 +78,13 @@ class Pass:
         corners = Delaunay(other.element.points).simplices  # of flat pieces of a facet
         turned = np.linalg.det(other.element.points[corners[:, 1:]] - other.element.points[corners[:, :1]]) < 0
         corners[turned] = corners[turned][:, ::-1]
-        # At rest, and the share of them that is subtracted now.
-        self.overlaps, self.share = np.zeros(len(self.areas)), 0.0
+        self.overlaps, self.share = (
+            np.zeros(len(self.areas)),
+            0.0,
+        )  # at rest, and the share of them that is subtracted now
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
         self.own = OwnPairs(side) if side is other else None
-        # Friction follows places within facets alone, and a part with itself may be thin.
-        self.strict = True  # else a point stays on its facet whatever it feels there
-        self.edges = None if law.friction or self.own else FacetEdges(other)
         # Below half the thickness of a part its other side is nearer. Parts of one that overlap at rest are not that.
         inset = law.smoothing if self.own else 0.0
         triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
@@ -108,10 +100,10 @@ class Pass:
         return np.asarray((self.basis @ self.side.nodes(unknowns)).reshape(-1, 3))
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, settled: Settled | None = None) -> Met:
-        """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``; at a
-        crease with an edge or corner, so that the gap is continuous. A facet reaches as deep as its radius, and as half the
-        thickness of its part. Of a part with itself only those that were in front of their facet in the ``settled`` state, by
-        default the present one, or in contact with it or the next: what is behind a facet is the body itself.
+        """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
+        reaches as deep as its radius, and as half the thickness of its part. Of a part with itself only those that were in front of
+        their facet in the ``settled`` state, by default the present one, or in contact with it or the next: what is behind a facet
+        is the body itself.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
@@ -119,38 +111,19 @@ class Pass:
         some, facets = self._beside(nodes, points, some, facets, most)
         some, facets = self._outside(some, facets, settled or (unknowns, None))
         there = self.other.nearest(nodes, facets, points[some])
-        gap, beyond = np.vecdot(points[some] - there.point, there.normal), self.other.beyond(there.at)
-        before = np.full(len(points), -1)
+        gap = np.einsum("ni,ni->n", points[some] - there.point, there.normal)
+        beyond, before = self.other.beyond(there.at), np.full(len(points), -1)
         if last is not None:
-            before[last.points[~last.on_edge]] = last.facets[~last.on_edge]
-        stays = (before[some] == facets) & (beyond <= _STAYS)
+            before[last.points] = last.facets
+        beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
         reach = np.minimum(radii, self.deepest)[facets]
-        on_edge = np.zeros(len(some), bool)
-        if self.edges:
-            asked = (gap < self.law.smoothing) & (gap > -reach) & (beyond > 0) & (beyond < _ASKED) & ~stays
-            there, on_edge = self.edges.instead(there, nodes, (facets, points[some]), np.flatnonzero(asked))
-            gap, beyond[on_edge] = np.vecdot(points[some] - there.point, there.normal), 0.0
-        felt = np.flatnonzero((gap < most) & (gap > -reach) & ((beyond <= _BEYOND) | stays))
+        felt = np.flatnonzero((gap < most) & (gap > -reach) & (beyond <= _BEYOND))
         here = self._here(self.side.nodes(unknowns), some[felt])
-        felt, here = felt[faces := np.vecdot(here.normal, there.normal[felt]) < 0], here[faces]
-        found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt], on_edge[felt])
-        found = found.some(self._first(found, beyond[felt], stays[felt]))
-        outside = np.zeros(len(found.gap), bool)
-        if self.edges and (deep := found.gap < -self.law.smoothing).any():
-            outside[deep] = self.edges.before(nodes, found.here.point[deep], -found.gap[deep])
-        return found.some(np.flatnonzero(~outside))
-
-    def _first(self, found: Met, beyond: Floats, stays: NDArray[np.bool_]) -> Ints:
-        """For each of the points ``found`` the one with the nearest place, or that on the facet where it ``stays`` (n,)."""
-        order = np.lexsort((np.abs(found.gap), beyond, found.points))
-        _, first, which = np.unique(found.points[order], return_index=True, return_inverse=True)
-        first = order[first]
-        press = (self.law.smoothing - found.gap)[:, None] * found.there.normal
-        change = np.linalg.norm(press[order] - press[first][which], axis=1)
-        alike = change <= _ALIKE * np.linalg.norm(press[first][which], axis=1)
-        held = stays[order] & (alike | (beyond[order] <= 0) if self.edges and self.strict else True)
-        first[which[held]] = order[held]
-        return first
+        faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
+        found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
+        order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
+        order = order[faces[order]]
+        return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
     def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
         """Those pairs of points and facets of a part with itself where the point was in front of the facet, or in contact there."""
@@ -252,7 +225,7 @@ class Pass:
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
-        free[near.points[near.gap <= 0]] = free[last.points[last.gap <= 0]] = False
+        free[near.points[near.gap <= 0]] = False
         return np.union1d(behind, self._passed(starts, ends, old, new, free))
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
@@ -280,10 +253,7 @@ class Pass:
             pieces = self.pieces[facets[part]]
             which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
             corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
-            found = passed(starts[points], ends[points], *corners)
-            pair = part[found.reshape(pieces.shape[:2]).any(axis=1)]
-            who, paths = some[pair], np.stack([starts, ends])[:, some[pair]]
-            lost.append(who[~self.other.keep_away(old, new, facets[pair], paths)])
+            lost.append(points[passed(starts[points], ends[points], *corners)])
         return np.unique(np.concatenate(lost))
 
 

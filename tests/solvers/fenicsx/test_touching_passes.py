@@ -134,7 +134,7 @@ def test_points_that_face_the_same_way_do_not_meet() -> None:
 
 
 def test_a_point_stays_on_its_facet_a_little_beyond_the_edge() -> None:
-    contact, _ = crumpled("P1/P1", 0.3)
+    contact, _ = crumpled("P1/P1")
     one, unknowns = contact.passes[0], contact.unknowns.x.array
     first = one.met(unknowns, D)
     assert (one.other.beyond(first.there.at) <= 0.02).all()
