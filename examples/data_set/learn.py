@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from network import network
+from fits import kernel, network
 
 
 def blended(one: dict) -> np.ndarray:
@@ -22,15 +22,6 @@ def features(one: dict) -> np.ndarray:
     fixed = [*np.ptp(one["points"][:420].reshape(21, 20, 3)[::3], axis=1)[:, :2].ravel()]
     fixed += [one["points"][:, 2].max(), one["points"][200:220, 0].mean()]
     return np.c_[poses.reshape(len(poses), -1), one["activation"], np.tile(fixed, (len(poses), 1))]
-
-
-def kernel(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Ridge regression by ``(1 + x.x')^2``, its weight by leaving one out."""
-    own, tried = (1 + x @ x.T) ** 2, {}
-    for weight in 10.0 ** np.arange(-6, 3):
-        inverse = np.linalg.inv(own + weight * np.eye(len(x)))
-        tried[np.linalg.norm(inverse @ y / np.diag(inverse)[:, None])] = inverse
-    return (1 + at @ x.T) ** 2 @ tried[min(tried)] @ y
 
 
 def learned(fit, seen: list, one: dict, rows: list) -> np.ndarray:

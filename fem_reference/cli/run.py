@@ -1,4 +1,4 @@
-"""The command ``run``: solve a case by its reference, or by another solver."""
+"""The verb ``run``: solve a case by its reference, or by another solver."""
 
 import argparse
 
