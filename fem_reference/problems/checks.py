@@ -10,9 +10,8 @@ from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
-from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import friction, regions, tendons
+from fem_reference.problems import directions, friction, regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -26,7 +25,6 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
-_UNIT = 1e-6  # the tolerance on the length of a unit vector
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume counts as flat
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
@@ -223,30 +221,16 @@ def _check_needs(body: Body) -> None:
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
     for places in body.mesh.places():
-        _check_unit(body.fibre, places)
-
-
-def _check_unit(fibre: Directions, places: Floats) -> None:
-    """Raise InputError unless the directions at ``places`` (n, 3) [mm], one in each cell, are unit vectors."""
-    cells = np.arange(len(places))
-    try:
-        found = np.asarray(fibre(cells, places), float)
-    except Exception as error:  # any error in a function of the caller
-        raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
-    if found.shape != (len(cells), 3):
-        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
-    lengths = np.linalg.norm(found, axis=1)
-    worst = int(np.argmax(np.where(np.isfinite(lengths), np.abs(lengths - 1), np.inf)))
-    if not abs(lengths[worst] - 1) <= _UNIT:
-        raise InputError("fibre", f"a direction of length {lengths[worst]:.6g} in cell {worst}", "unit vectors")
+        directions.check_unit(body.fibre, places)
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon or friction is beside tension at
-    rest, two regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed. They are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where laws leave a part of the body without (``regions.check``), the normal of a law is along fibres, a
+    tendon or friction is beside tension at rest, two regions of its surface prescribe different exact displacements at shared
+    places, or a path of motion cannot be followed. They are compared at all frames, all stops, and the middles between them.
     """
     regions.check(body)
+    directions.check_normals(body)
     tendons.check(body)
     friction.check(body.frictions, begun=body.begun)
     ends = np.unique([*body.frames, *body.stops])
