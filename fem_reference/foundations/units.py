@@ -83,16 +83,24 @@ def quantity(text: object, kind: str) -> float:
     if not number or unit not in (own.written or (unit,)) or _NO_UNIT.search(unit):
         raise wrong
     try:
-        read = _registry().Quantity(float(number), _registry().parse_units(unit))
-        value = float(read.to(own.unit or "dimensionless").magnitude)
-        same = read.to_root_units().units == _registry().Quantity(1.0, own.unit).to_root_units().units
+        value = float(number) * _factor(unit, own.unit)
     except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
         raise wrong from error
-    if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit distinguishes it
+    if not math.isfinite(value):
         raise wrong
     if abs(value) > own.greatest:
         raise ValueError(f"{kind} of at most {own.greatest:g} {own.unit}".rstrip())
     return value
+
+
+@cache
+def _factor(unit: str, inside: str) -> float:
+    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, where the two are not of one kind."""
+    one = _registry().Quantity(1.0, _registry().parse_units(unit))
+    factor = float(one.to(inside or "dimensionless").magnitude)
+    # To pint an angle has no dimension, its root unit distinguishes it.
+    same = one.to_root_units().units == _registry().Quantity(1.0, inside).to_root_units().units
+    return factor if same else math.nan
 
 
 def _split(text: object) -> tuple[str, str]:
