@@ -74,7 +74,7 @@ def test_each_tetrahedron_is_in_one_part_once(feb: Element, problem: MuscleProbl
 
 
 def test_materials_are_the_laws_times_their_shares(feb: Element, problem: MuscleProblem) -> None:
-    """Stiffness goes from that of the muscle to a hundredfold of it, in each tetrahedron that of the mean share, as near as parts are."""
+    """The stiffness rises a hundredfold: in each tetrahedron it is that of the mean share, as near as parts are."""
     share = Blended(depth, WIDTH)
     stress = next(one.stress for one in problem.effects if isinstance(one, FibrePassive))
     # A quadrature of 20 x 20 x 20 points, by barycentric shares, for the one of four.
