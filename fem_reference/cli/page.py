@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _examples(options: argparse.Namespace) -> int:
-    """Cases with all their candidates, one after the other."""
+    """The Octave examples with all their candidates."""
     cases = [casefile.read(name) for name in OCTAVE]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
@@ -89,7 +89,7 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+        Bench(scenes[name], out(options)).setup()  # the data of a case that is named must not be missing
     own = own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -130,7 +130,7 @@ def _estimation(options: argparse.Namespace) -> int:
 
 
 def _credibility(options: argparse.Namespace) -> int:
-    """The evidence for each quantity; moment arms where the anatomy is there."""
+    """The evidence for each quantity, with moment arms where the anatomy is installed."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
     entries = runner.entries().values()

@@ -14,9 +14,9 @@ class Pressure(Ramped, Load):
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
 
-    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. What
-    is attached exactly keeps its size, and the body around it is sheared: a cube of side L with one clamped triangle, whose legs
-    are a, keeps 0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
+    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. A
+    clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle of legs a, V/V0 is
+    greater by 0.15 mu / K (a / L)^3 p / K, for example 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}

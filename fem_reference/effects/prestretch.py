@@ -10,8 +10,8 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 
 
 class Prestretch(Ramped, Prestrain):
-    """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: stretched by ``l = 1 + amount (stretch - 1)`` along the
-    fibre f, at the same volume.
+    """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)`` along
+    the fibre f, at the same volume.
 
     ``stretch``: without unit, above 1 where fibres are taut at rest.
     """

@@ -2,9 +2,9 @@
 
 import errno
 
-# What the system calls a disk, or a share of one, that is full, and a file that is too large.
+# Error numbers of a full disk, an exhausted quota and a file that is too large.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# Of what was got, a message shows this many characters.
+# The most characters of a value that a message shows.
 _SHOWN = 400
 
 
@@ -20,7 +20,7 @@ class InputError(Exception):
         self.place, self.got, self.want = place, got, want
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
-        """Enough to go from one process to another."""
+        """The class and its arguments, so that an error can be passed to another process."""
         return type(self), (self.place, self.got, self.want)
 
 

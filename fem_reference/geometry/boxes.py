@@ -1,4 +1,4 @@
-"""Boxes along the axes around triangles and points, and which of two sets of them may touch."""
+"""Axis-aligned boxes around triangles and points, and a search for those of two sets that may touch."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -21,7 +21,7 @@ class Boxes:
 
     @cached_property
     def largest(self) -> Floats:
-        """The extent (3, 1) [mm] of the largest box along each axis, and what differences of coordinates are rounded by."""
+        """The extent (3, 1) [mm] of the largest box along each axis, plus the round-off of differences of coordinates."""
         rounding = 4 * np.finfo(float).eps * max(float(np.abs(side).max()) for side in (self.low, self.high))
         return np.asarray((self.high - self.low).max(axis=1, keepdims=True) + rounding)
 

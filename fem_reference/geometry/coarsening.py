@@ -1,4 +1,4 @@
-"""Fewer triangles: a coarser surface of well-shaped ones on a fine one."""
+"""Coarsening of surfaces: fewer and well-shaped triangles on a fine surface."""
 
 import igl
 import numpy as np
@@ -13,7 +13,7 @@ _ROUNDS = 6
 # A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving
 # along it keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
 _FREE = 0.03
-# Distance of the inversion's pole in diagonals of the body: nearer, sharp edges move; farther, flat parts stay flat.
+# Distance of the inversion's pole in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny

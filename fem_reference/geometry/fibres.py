@@ -17,7 +17,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
 POINTS = 40  # of each line
-_NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
+_NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
 # Seeds whose relative difference is less are ordered by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # a field of 1/2 up to round-off is above it
@@ -40,7 +40,7 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields that do not derive from others; only these are passed to other processes."""
+        """The fields without those derived from others, for other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002

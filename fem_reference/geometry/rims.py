@@ -16,13 +16,13 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 Bools = NDArray[np.bool_]
 
-# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle. More rounds off corners.
+# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle; longer, it rounds corners.
 _SMOOTHED = 0.1
 # A vertex nearer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers stay.
 _NEAR = 0.3
 # A fixed vertex nearer than this counts as on the rim.
 _THERE = 0.2
-# An edge over a piece of an attachment, or a gap in it, is cut where these are wider than this share of it.
+# An edge over a piece of an attachment, or over a gap in it, is cut where that is wider than this share of the edge.
 _NARROW = 0.3
 _REFINED = 2  # rounds of search for narrow pieces and gaps
 _ISLAND = 0.1  # squares of the size: the least area of an island of an attachment that is kept

@@ -38,7 +38,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
         case Cylinder():
             points, triangles = _prism(solid, turn)
         case _:
-            raise TypeError(f"{type(solid).__name__} has no closed form that is known here")
+            raise TypeError(f"{type(solid).__name__} is not a body of closed form")
     return Surface(points, triangles, place)
 
 

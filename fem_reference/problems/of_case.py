@@ -31,7 +31,7 @@ CaseProblem = MuscleProblem | MusclesProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on which effects a case needs, and why, from the set-up that ``rest`` gives, or a new one; none of a field."""
+    """Decisions on the effects that a case needs, with reasons, from the set-up ``rest`` or a new one; none for a field."""
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -118,7 +118,7 @@ def _motion(motion: RigidMotion | None) -> str:
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """The effect of the bones' motion on a muscle, its regions, and why it needs its effects, in words; nothing of a field."""
+    """The effect of the bones' motion on a muscle, its regions, and the reasons for its effects, in words; empty for a field."""
     if isinstance(case, MusclesCase):
         every = case.decisions or explained(case, lambda: setup)
         return {"effects": {one.title: one.why for one in every}}

@@ -1,6 +1,7 @@
 """The regions of a muscle in a case, in which effects act: tendons, aponeuroses, fat, compartments."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -42,7 +43,7 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """All where the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
+    """The part in which the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
 
     start: str
     end: str
@@ -59,11 +60,11 @@ class ShareOfField(Record):
 
 class CaseRegion(Record):
     """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface``, ``tets``
-    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are one.
+    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are united.
     """
 
     name: Name
-    width: Length
+    width: Annotated[Length, Field(ge=0)]
     attachment: LengthFromAttachment | None = None
     patch: DepthBelowPatch | None = None
     surface: ClosedSurface | None = None
@@ -78,13 +79,6 @@ class CaseRegion(Record):
         if name.startswith(REST):
             raise ValueError(f'a name that does not begin with "{REST}", which stands for the rest of the muscle')
         return name
-
-    @field_validator("width")
-    @classmethod
-    def _check_width(cls, width: float) -> float:
-        if not width >= 0:
-            raise ValueError("a length of 0 or more")
-        return width
 
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:

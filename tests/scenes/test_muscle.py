@@ -45,7 +45,7 @@ WRONG = [
 def test_attachments_may_be_none(bar: Path) -> None:
     start, end = SCENE.index("[[attachment]]"), SCENE.index("[[effect]]")
     text = SCENE[:start] + SCENE[end:]
-    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want a name that is there: there is none'):
+    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want none, as none is defined'):
         casefile.read(written(bar, text))
     traced = text[text.index("[fibres.traced]") : text.index("[frames]")]
     lines = 'fibres.polylines = { file = "fibres.vtk", unit = "mm" }\n'

@@ -34,7 +34,7 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format, by the suffix of its files; TypeError where a module defines none, or a suffix that another has."""
+    """Every format, by the suffix of its files; TypeError where a module defines none, or the suffix of another."""
     found: dict[str, Format] = {}
     for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")
