@@ -109,7 +109,9 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
         if takes is not None and posed.problem.muscle is not None:
             acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
-                return Cell(hard.name, solver, "not applicable", f"it omits effects that act here: {', '.join(lacks)}")
+                return Cell(
+                    hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
+                )
         with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:

@@ -37,7 +37,7 @@ def test_a_solver_that_leaves_out_what_acts_is_no_success() -> None:
         ("round_edge.tendon", ("contact",), "fibre_passive"),
     ):
         found = running.cell(running.Posed(CASES[name]), choice, takes)
-        assert (found.verdict, found.sentence) == ("not applicable", f"it omits effects that act here: {lacks}")
+        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out effects of this case: {lacks}")
     assert running.cell(running.Posed(CASES["at_rest.millimetres"]), choice, ()).verdict == "ok"
 
 
