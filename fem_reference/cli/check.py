@@ -21,7 +21,6 @@ HELP = "judge a candidate against its earlier results and against the reference,
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)

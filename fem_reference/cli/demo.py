@@ -11,7 +11,6 @@ HELP = "compare the candidates of the case hip_flexion with its reference"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "--ranks", "--name")
 
 

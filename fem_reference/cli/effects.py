@@ -15,7 +15,6 @@ HELP = "leave out each effect of a case in turn, measure the change and the time
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set", "--name", "--workers")
 
 

@@ -46,7 +46,6 @@ OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figur
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     names = sorted(_PAGES)
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: only this case (default: all); may be repeated"
@@ -71,7 +70,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _examples(options: argparse.Namespace) -> int:
-    """The Octave examples with all their candidates."""
     cases = [casefile.read(name) for name in OCTAVE]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():

@@ -25,7 +25,6 @@ HELP = "recommend a solver and setting for an error or a time, from the results 
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set")
     error = "the greatest error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)

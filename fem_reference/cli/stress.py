@@ -19,7 +19,6 @@ HELP = "run the hard cases with every solver, and write a page that shows which 
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"

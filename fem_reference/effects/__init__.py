@@ -102,7 +102,6 @@ class Ramped(Effect):
         return ramp
 
     def amount(self, frame: float) -> float:
-        """The amount of the effect at a frame."""
         frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.ramp), strict=True)
         return float(np.interp(frame, frames, amounts))
 
@@ -149,11 +148,9 @@ class VolumeLaw(Energy):
     bulk: PositivePressure
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(bulk=self.bulk)
 
 

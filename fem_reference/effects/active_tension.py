@@ -24,5 +24,4 @@ class ActiveTension(Ramped, Energy):
         return fibre_indicator(scene, pull, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return state.amount * self.tension / 2 * (state.J ** (-2 / 3) * state.square_stretch(state.fibre) - 1)

@@ -37,7 +37,6 @@ class CollagenAcross(Energy):
         return Moduli(shear=self.k1 / 4)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         factor, functions = state.J ** (-2 / 3), state.functions
         mean = factor * (state.I1 - state.square_stretch(state.fibre)) / 2
         area = sum(sum(entry * a for entry, a in zip(row, state.fibre, strict=True)) ** 2 for row in state.cofactors)

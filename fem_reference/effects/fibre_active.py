@@ -35,7 +35,6 @@ class FibreActive(Ramped, Energy):
     optimal_stretch: float = Field(gt=0)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the fibre stretch."""
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:

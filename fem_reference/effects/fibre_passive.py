@@ -48,11 +48,9 @@ class FibrePassive(PassiveFibres):
     linear_from: float = Field(gt=1)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the fibre stretch."""
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(fibres=self.stress)
 
     def energy(self, state: State) -> Any:

@@ -25,7 +25,6 @@ class Guccione(Energy):
     bfs: float = Field(gt=0)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.c * self.bt / 2)
 
     def energy(self, state: State) -> Any:

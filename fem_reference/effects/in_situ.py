@@ -28,7 +28,6 @@ class InSitu(Prestrain):
     stretch: float = Field(gt=0)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
-        """The deformation gradient (3, 3) that the energies see."""
         return state.stretched(self.stretch)
 
 

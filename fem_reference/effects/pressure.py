@@ -34,6 +34,5 @@ class Pressure(Ramped, Load):
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
-        """Force per rest area [MPa], (3,)."""
         load = -state.amount * self.pressure
         return [load * sum(c * n for c, n in zip(row, normal, strict=True)) for row in state.cofactors]

@@ -32,5 +32,4 @@ class Prestretch(Ramped, Prestrain):
         return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
-        """The deformation gradient (3, 3) that the energies see."""
         return state.stretched(1 + state.amount * (self.stretch - 1))

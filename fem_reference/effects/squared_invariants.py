@@ -23,5 +23,4 @@ class SquaredInvariants(Energy):
         return Moduli(bulk=self.lame + 4 * self.mu)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return self.mu / 2 * (state.I1 - 3) ** 2 + self.lame / 2 * (state.J - 1) ** 2

@@ -19,15 +19,12 @@ class StVenantKirchhoff(Energy):
     lame: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         C = state.C
         square = sum((C[i][k] - (i == k)) ** 2 for i in range(3) for k in range(3)) / 4
         return self.mu * square + self.lame / 8 * (state.I1 - 3) ** 2

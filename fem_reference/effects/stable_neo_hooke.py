@@ -18,10 +18,8 @@ class StableNeoHooke(Energy):
     lame: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         more = state.J - 1
         return self.mu * ((state.I1 - 3) / 2 - more) + (self.lame + self.mu) / 2 * more**2

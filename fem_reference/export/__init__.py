@@ -56,12 +56,10 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
 
 
 def _parts(case: Case) -> tuple[MuscleCase, ...]:
-    """The muscles of a case."""
     return tuple(casefile.muscle(one) for one in case.parts or (case,))
 
 
 def _muscle(problem: CaseProblem) -> MuscleProblem:
-    """The problem of a muscle; InputError where there is none."""
     if problem.muscle is None:
         raise InputError("export", "a scalar field", "a muscle")
     return problem.muscle

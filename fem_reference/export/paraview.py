@@ -130,7 +130,6 @@ class _Frames:
         return {"reference": own, "candidates": runs, "bones": bones, "attachments": attachments}
 
     def _run(self, run: Run, i: int) -> dict[str, DataBlock]:
-        """The blocks of a ``run`` at a frame."""
         blocks, frame = {}, run.numbers[i]
         state = self.results if run is self.reference else None
         state = None if state is None or frame not in state.frames else state

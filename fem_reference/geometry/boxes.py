@@ -56,9 +56,7 @@ def reached(one: Boxes, other: Boxes) -> Ints:
 
 
 def _near(one: Boxes, some: Ints, other: Boxes) -> Ints:
-    """The boxes (k,) of ``other`` that may touch ``some`` of ``one``: their low corners are in a cell of a regular grid into which
-    one of these reaches, extended by the largest of ``other``.
-    """
+    """The boxes (k,) of ``other`` whose low corner is in a grid cell that ``some`` of ``one`` reach, extended by the largest."""
     if not (len(some) and other.low.size):
         return np.zeros(0, np.int64)
     begin, end = np.take(one.low, some, axis=1) - other.largest, np.take(one.high, some, axis=1)

@@ -125,9 +125,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts with edges cut that pass over a narrow piece of an attachment or a gap in it: edges that, in between, are on the
-    other side of the level of a half for much of their length.
-    """
+    """The parts with edges cut that are on the other side of the level 1/2 for much of their length, but not at their ends."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]

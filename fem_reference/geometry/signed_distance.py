@@ -225,10 +225,7 @@ def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: fl
 
 
 def _coefficients(values: Floats) -> Floats:
-    """The coefficients of the B-splines through ``values`` (i, j, k), with one more on each side.
-
-    The values continue beyond the border by reflection in their border value, which leaves no bend there.
-    """
+    """Coefficients of the B-splines through ``values`` (i, j, k) and one more on each side, by odd reflection at the border."""
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
     return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])

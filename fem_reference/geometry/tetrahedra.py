@@ -75,10 +75,7 @@ def check_size(surface: Surface, size: float) -> None:
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
-    """Origin (3,) and axes in columns (3, 3) of the frame that the points span.
-
-    From point 0 to the point farthest from it, and from that line to the farthest from it; of equally far ones to the first.
-    """
+    """Origin (3,) and axes in columns (3, 3): from point 0 to the farthest, then to the farthest from that line."""
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]
     first = first / np.linalg.norm(first)
@@ -204,7 +201,6 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
 
 
 def _largest_part(tets: Ints, place: str) -> Ints:
-    """The tets of the largest part connected by triangles."""
     faces = np.sort(tets[:, TET_FACES].reshape(-1, 3), axis=1)
     _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
     if sides.max() > 2:

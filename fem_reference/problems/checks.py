@@ -100,7 +100,6 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_integer(value: Any) -> bool:
-    """True for an integer that is not a bool."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
@@ -160,7 +159,6 @@ def _check_indices(place: str, given: Any, width: int, count: int) -> None:
 
 
 def _check_volumes(mesh: Cells) -> None:
-    """Raise InputError where a cell has no volume."""
     corners = mesh.points[mesh.cells[:, [0, 1, 2, 3 if mesh.kind == "tetrahedron" else 4]]]
     edges = corners[:, 1:] - corners[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)

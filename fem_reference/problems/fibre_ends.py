@@ -149,9 +149,7 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The area of the triangles ``part`` (r, 3, 3) within the mean spacing of so many ``fibres`` of ``ends`` (m, 3), as a share:
-    whole triangles, by their centroids, so that it is wrong by up to the area of those that the border of the region cuts.
-    """
+    """The share of the area of triangles ``part`` (r, 3, 3) whose centroid is within the mean fibre spacing of ``ends`` (m, 3)."""
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():
         return 0.0

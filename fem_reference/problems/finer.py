@@ -86,8 +86,8 @@ def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes
-    are equal where the same corners have the same ``shares`` (8, k, c), so nodes of touching bodies stay separate.
+    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes are
+    equal where the same corners have the same ``shares`` (8, k, c).
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)

@@ -68,7 +68,6 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
-    """The muscle, its bones, attachments, effects and frames."""
     surface, frames = setup.surface, case.frames
     return {
         "muscle": {

@@ -110,9 +110,7 @@ def check(body: Body) -> None:
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
-    """Raise InputError where ``laws`` of one ``kind``, if any, do not cover one of the ``points`` (n, 3). The shares of laws with
-    the pressure unknown p have to sum to 1, or p is not the pressure.
-    """
+    """Raise InputError where ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of a pressure sum to 1."""
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
     if laws and not off.max() <= 0:

@@ -189,9 +189,7 @@ def _steps(places: Floats) -> Floats:
 
 
 def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
-    """The angles (m - 1,) [rad] by which a thing turns from each of ``frames`` (m,) to the next: the known ones, or the greatest of
-    a direction from the middle of its points at ``places`` (m, p, 3) to one of them.
-    """
+    """The angles (m - 1,) [rad] between ``frames`` (m,): known, or the greatest of a direction from the middle to a point."""
     if thing.turning is not None:
         knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)

@@ -220,7 +220,6 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
 
 
 def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
-    """The facets that a condition is on."""
     facets, x, interval = mesh.facets, mesh.points[:, 0], mesh.cells.shape[1] == 2
     if interval == (entry.on == "rim"):
         return facets[:0]

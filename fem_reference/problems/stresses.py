@@ -159,7 +159,6 @@ class Watch:
 
     @property
     def _tense(self) -> bool:
-        """True for a muscle in situ."""
         return in_situ.among(self.case.effects) is not None
 
     def _most(self) -> float:

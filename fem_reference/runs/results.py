@@ -263,9 +263,7 @@ class _Places:
 
 @cache
 def _rule() -> tuple[Floats, Floats]:
-    """Barycentric coordinates (27, 4) and shares of the volume (27,) of a rule that is exact to degree 5: Gauss-Jacobi points on
-    lines to one corner, on those of the opposite side to another, and along its edge (Stroud 1971, conical product).
-    """
+    """Barycentric coordinates (27, 4) and shares (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
     (u, a), (v, b), (w, c) = (scipy.special.roots_jacobi(3, power, 0) for power in (2, 1, 0))
     x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
     rest = (1 - x) * (1 - y)

@@ -155,7 +155,6 @@ class Run:
         return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(point(centre), self.force(bone))
 
     def _repr_html_(self) -> str:
-        """The run as notebooks display it."""
         known = ("seconds", "newton_iterations", "unknowns")
         cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {

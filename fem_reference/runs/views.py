@@ -8,7 +8,6 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem, Span
-from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Run
 
 # Scalars of all muscles together, which are left out for a single one.
@@ -33,12 +32,16 @@ def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
         {own: vector for key, vector in some.items() if (own := _own(key, span.name, others))}
         for some in (frame.forces, frame.moments)
     )
+    if (state := frame.state) is not None:
+        before = state.before[span.cells] if len(state.before) else state.before
+        own = {"displacement": state.displacement[span.cells], "pressure": state.pressure[span.cells]}
+        state = replace(state, before=before, **own)
     return replace(
         frame,
         surface=frame.surface[span.vertices],
         fibres=frame.fibres[span.fibres],
         points=frame.points[span.points],
-        state=None if frame.state is None else _state_of(frame.state, span.cells),
+        state=state,
         forces=forces,
         moments=moments,
     )
@@ -55,12 +58,6 @@ def _own(key: str, name: str, others: tuple[str, ...]) -> str:
         if key == force_between(other, name):
             return other
     return key.removeprefix(f"{name} ") if key.startswith(f"{name} ") and not key.endswith(" free") else ""
-
-
-def _state_of(state: NodalState, cells: slice) -> NodalState:
-    """The state of some of the cells."""
-    before = state.before[cells] if len(state.before) else state.before
-    return replace(state, displacement=state.displacement[cells], pressure=state.pressure[cells], before=before)
 
 
 def beside(runs: Mapping[str, Run]) -> dict[str, Run]:

@@ -147,7 +147,6 @@ class Case(Record):
         raise NotImplementedError(f"{type(self).__name__} has no facts")
 
     def _repr_html_(self) -> str:
-        """The case as notebooks show it."""
         facts = self.facts | {
             "effects": ", ".join(self.acting),
             "reference": self.reference.solver,
@@ -180,9 +179,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read. A case
-        made by a program may read any file that the program may.
-        """
+        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))

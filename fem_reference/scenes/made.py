@@ -33,7 +33,6 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
 
 
 def _effect(entry: Any) -> Any:
-    """An effect as the table that a file has."""
     if isinstance(entry, Record):
         values = {key: value for key, value in entry.model_dump(by_alias=True).items() if value is not None}
         entry = {"name": name_of(entry)} | values

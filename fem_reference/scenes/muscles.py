@@ -18,6 +18,8 @@ from fem_reference.scenes.regions import CaseRegion
 
 # Keys of one muscle among several; in the case of a single muscle they are keys of the case.
 BESIDE = ("attachment", "fibres", "region", "expect")
+# The keys of the case that the case of each muscle has too.
+_SHARED = ("proves", "choice", "bone", "joint", "frames", "reference", "candidate", "folder", "from_file")
 
 
 class MuscleOfSeveral(Muscle):
@@ -117,33 +119,16 @@ class MusclesCase(DrivenCase):
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:
-        """Each muscle as a case of its own, without the others."""
-        return tuple(self._parts())
-
-    def _parts(self) -> Iterator[MuscleCase]:
-        """The cases, which were checked as this one was read."""
-        everywhere = tuple(one for one in self.effect if not isinstance(one, MuscleContact))
+        """Each muscle as a case of its own, without the others; they were checked when this case was read."""
+        everywhere, found = tuple(one for one in self.effect if not isinstance(one, MuscleContact)), list[MuscleCase]()
         for i, muscle in enumerate(self.muscle):
-            own = {name: getattr(muscle, name) for name in BESIDE}
-            alone = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})
-            yield MuscleCase.model_construct(
-                None,
-                title=f"{self.title}: {muscle.name}",
-                name=f"{self.name}_{muscle.name}",
-                proves=self.proves,
-                choice=self.choice,
-                effect=(*everywhere, *muscle.effect),
-                muscle=alone,
-                bone=self.bone,
-                joint=self.joint,
-                frames=self.frames,
-                reference=self.reference,
-                candidate=self.candidate,
-                folder=self.folder,
-                place=join(self.place, f"muscle[{i}]"),
-                from_file=self.from_file,
-                **own,
-            )
+            made: dict[str, Any] = {name: getattr(self, name) for name in _SHARED}
+            made |= {name: getattr(muscle, name) for name in BESIDE}
+            made["muscle"] = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})
+            made |= {"title": f"{self.title}: {muscle.name}", "name": f"{self.name}_{muscle.name}"}
+            made |= {"effect": (*everywhere, *muscle.effect), "place": join(self.place, f"muscle[{i}]")}
+            found.append(MuscleCase.model_construct(None, **made))
+        return tuple(found)
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:

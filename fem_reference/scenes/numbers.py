@@ -118,13 +118,9 @@ def _along(case: Case, key: str) -> list[Any]:
     found: list[Any] = [case]
     for part in parts(key):
         inside = found[-1]
-        known = isinstance(inside, tuple) and part < len(inside) if isinstance(part, int) else part in _names(inside)
+        fields = getattr(type(inside), "model_fields", ())
+        known = isinstance(inside, tuple) and part < len(inside) if isinstance(part, int) else part in fields
         if not known:
             raise InputError(join(case.place, key), "nothing", "the key of a number that this case has")
         found.append(inside[part] if isinstance(part, int) else getattr(inside, part))
     return found
-
-
-def _names(inside: Any) -> set[str]:
-    """The keys of a record."""
-    return set(type(inside).model_fields) if isinstance(inside, Record) else set()

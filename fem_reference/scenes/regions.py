@@ -90,10 +90,6 @@ def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments:
     ]
     check_used([one.name for one in regions], laws, place)
     for i, one in enumerate(regions):
-        near = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
-        ends = (
-            [(f"region[{i}].field.start", one.field.start), (f"region[{i}].field.end", one.field.end)]
-            if one.field
-            else []
-        )
-        check_used(attachments, near + ends, place)
+        named = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
+        named += [(f"region[{i}].field.{end}", getattr(one.field, end)) for end in ("start", "end") if one.field]
+        check_used(attachments, named, place)

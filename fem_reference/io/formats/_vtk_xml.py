@@ -131,7 +131,6 @@ def _taken(data: memoryview, count: int) -> bytes:
 
 
 def _decoded(data: memoryview, count: int) -> bytes:
-    """The first ``count`` bytes of base64 data."""
     return _taken(memoryview(base64.b64decode(_taken(data, 4 * -(-count // 3)), validate=True)), count)
 
 

@@ -59,7 +59,6 @@ def _element(body: bytes, count: int, properties: list[list[str]], types: dict[s
 
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - PLY has no displacements
-    """PLY as text, coordinates in full."""
     axes = "".join(f"property double {axis}\n" for axis in "xyz")
     head = (
         f"ply\nformat ascii 1.0\ncomment unit mm\nelement vertex {len(surface.points)}\n{axes}"
