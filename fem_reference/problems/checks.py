@@ -67,8 +67,11 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
-    three = isinstance(size, tuple | list | np.ndarray) and getattr(size, "ndim", 1) == 1 and len(size) == 3
-    if not (three and all(_is_number(one) and one > _SHORTEST for one in size)):
+    if (
+        not isinstance(size, tuple | list | np.ndarray)
+        or np.shape(size) != (3,)
+        or not all(_is_number(one) and one > _SHORTEST for one in size)
+    ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
         raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
@@ -84,8 +87,12 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
 
 def check_frames(frames: object, place: str) -> None:
     """Raise InputError unless ``frames`` are increasing numbers."""
-    listed = isinstance(frames, Sequence | np.ndarray) and not isinstance(frames, str | bytes) and len(frames) > 0
-    if not (listed and all(_is_number(one) for one in frames)):
+    if (
+        isinstance(frames, str | bytes)
+        or not isinstance(frames, Sequence | np.ndarray)
+        or len(frames) == 0
+        or not all(_is_number(one) for one in frames)
+    ):
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "frame numbers that are each later than the one before")
