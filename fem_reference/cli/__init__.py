@@ -70,7 +70,7 @@ def _explain(message: str, options: argparse.Namespace) -> None:
 def _why_broken(error: BaseException) -> str:
     """The message for an unexpected exception: its text, its place, and what to do."""
     if isinstance(error, MemoryError):
-        return "there is not enough memory for this; nothing was judged. Smaller input, or larger tetrahedra, need less"
+        return "not enough memory; nothing was judged. Smaller input, or larger tetrahedra, need less"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
         return (
             f"the Python package {error.name} is not installed for {sys.executable}: pip install fem_reference there, which brings "

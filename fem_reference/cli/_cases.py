@@ -87,7 +87,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
 
 
 def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = ()) -> tuple[Candidate, ...]:
-    """The solver of ``--solver-command`` as a candidate with a name that none of the ``others`` has; nothing without one."""
+    """The solver of ``--solver-command`` as a candidate, with a name unlike those of ``others``; none without the option."""
     if options.solver_command is None:
         return ()
     own = command.choice(options.solver_command, Path.cwd(), "--solver-command")
@@ -176,7 +176,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]], page: str) -> Asked:
-    """The ``page`` of a comparison: of the reference where there are candidates and none is chosen, beside that of all."""
+    """The ``page`` of a comparison; a page of the reference alone where the case has candidates and none is chosen."""
     alone = bool(case.candidate) and not chosen
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     return asked("run" if alone else "compare", case, options, page, *who)

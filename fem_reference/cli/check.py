@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     scene = casefile.muscle(scene_of(options), "CASE")
     entry, place = choose(scene, options.candidate, options.unit)
     bench = checked_bench(scene, options, [(entry, place)])
-    # What is wrong with the baseline shows before anything is solved.
+    # Errors of the baseline are reported before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
     candidate = bench.obtain(entry.name, entry, place)  # first, as it may be bad input
     reference = bench.reference()

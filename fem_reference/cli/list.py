@@ -17,7 +17,7 @@ REQUIRED = "required"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """It has no options of its own, and writes nothing into ``--out``."""
+    """No own options; the verb writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
 
 

@@ -164,7 +164,7 @@ def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iter
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
-    """Frames that somebody else's solvers made, by the name of the case."""
+    """Frames of other people's solvers, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")

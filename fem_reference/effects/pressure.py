@@ -10,7 +10,7 @@ from fem_reference.foundations.loads import Shape, Wrench
 
 
 class Pressure(Ramped, Load):
-    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
+    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the present surface, by Nanson's formula.
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
 
@@ -29,7 +29,7 @@ class Pressure(Ramped, Load):
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The load on the whole part as it is now."""
+        """The load on the whole present part."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 

@@ -11,7 +11,7 @@ class Tendon(Interaction):
     ends of fibres that continue as the ``tendon`` of an attachment, to that point of its bone; slack lines do not push.
 
     ``on``: that attachment; ``stiffness`` [N/mm]: of all lines together, k by share of the area, ``E A / l0`` of a tendon of the
-    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and is refused beside ``in_situ``.
+    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with ``in_situ``.
     Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 

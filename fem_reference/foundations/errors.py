@@ -9,7 +9,7 @@ _SHOWN = 400
 
 
 class InputError(Exception):
-    """Unusable input: the place (file and key), what was got and what is wanted.
+    """Unusable input: its place (file and key), the given value and the wanted one.
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'
@@ -25,7 +25,7 @@ class InputError(Exception):
 
 
 def _shown(value: object) -> str:
-    """A value on one line that a terminal shows as it is: not too long, and without control characters."""
+    """A value as one line of text for a terminal: shortened, and without control characters."""
     text = str(value)
     if len(text) > _SHOWN:
         text = f"{text[: _SHOWN // 2]} ... {text[-_SHOWN // 4 :]}"

@@ -1,6 +1,6 @@
 """Indicators of the effects that a case needs, estimated before anything is solved.
 
-Hierarchical modelling decides what a model must have by an indicator of the modelling error (Oden and Prudhomme 2002,
+Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
 doi 10.1006/jcph.2002.7183). Here these are the displacement [mm] and the stress [MPa] that the effect causes, estimated from rest
 geometry, motion and parameters, beside the accuracy asked for. An isometric contraction displaces nothing; all of it is stress.
 """

@@ -19,7 +19,7 @@ from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing lays a parabola
-_FLAT = 1e-9  # twice the area of a triangle in the unit square: three points of one side have none
+_FLAT = 1e-9  # twice the area of a triangle in the unit square below which its points are on one side
 _SHORTEST = 0.1  # of the longest pennate fibre's extent along the muscle
 
 

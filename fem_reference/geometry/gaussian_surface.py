@@ -13,7 +13,7 @@ from fem_reference.geometry.distance import farthest_points
 
 # Points inside the surface that give the first centres, and vertices that the fit uses.
 _INSIDE, _SAMPLES = 20_000, 1500
-# The distance of points beside the surface, over the edge of a cube of the same volume.
+# The distance of samples on both sides of the surface, over the edge of a cube of the same volume.
 _BESIDE = 0.05
 # Rounds of the fit, each with the slopes of the level at the samples of the round before, and evaluations in each.
 _ROUNDS, _STEPS = 6, 8
@@ -56,8 +56,8 @@ class GaussianSurface:
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
     """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points beside them, robust against outliers. Deterministic; a turned or scaled surface has a turned or scaled fit up to rounding
-    where its principal axes are distinct.
+    points on both sides of them, robust against outliers. Deterministic; a turned or scaled surface has a turned or scaled fit up
+    to rounding, where its principal axes are distinct.
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")
@@ -109,7 +109,7 @@ def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
-    """Points (k, 3): vertices and those beside them on both sides; and their distances (k,) from the surface."""
+    """Points (k, 3): vertices, and points on both sides of them; and their distances (k,) from the surface."""
     some = farthest_points(surface.points, _SAMPLES)
     points, normals = surface.points[some], igl.per_vertex_normals(surface.points, surface.triangles)[some]
     sides = np.array([0.0, _BESIDE, -_BESIDE])

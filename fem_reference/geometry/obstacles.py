@@ -13,7 +13,7 @@ _MIDDLE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along them there."""
+    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and the unit vectors (n, 3) along the paths there."""
 
     obstacles: Ints
     met: Floats

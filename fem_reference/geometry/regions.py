@@ -17,7 +17,7 @@ Depth = Callable[[Floats], Floats]
 _RISE = 1000.0
 # Points at the border of a cell are moved by this share of the path to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
-# Sample points of a body: about as many, whatever its size.
+# The number of sample points of a body, about, independent of its size.
 _SAMPLES = 20_000
 
 
@@ -98,7 +98,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """Points (n, 3) [mm] inside a closed ``surface``, those of a regular grid, about 20,000: each stands for the same volume."""
+    """Points (n, 3) [mm] inside a closed ``surface``, about 20,000 of a regular grid, each for the same volume."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

@@ -77,7 +77,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """The parts with a new point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
+    """The parts with a new point in the middle of each island of an attachment of ``least`` [mm2] or more without a point."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)

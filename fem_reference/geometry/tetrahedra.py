@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
 _VOLUME_WITHIN = 0.05  # no closer, as the volume of a surface that passes through itself is not well defined
-_MOST_TETS = 3e6  # some GB and minutes, far above what a solver takes
+_MOST_TETS = 3e6  # some GB and minutes, far more than a solver can use
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
 

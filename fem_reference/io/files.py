@@ -1,6 +1,6 @@
 """Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
 
-A reader keeps the points of its file as they are: their order, their number, and float64 where the file has it.
+A reader keeps the order, the number and, where the file has it, the double precision of the points.
 """
 
 import csv
@@ -31,7 +31,7 @@ _SETTLED = 10.0
 
 
 def shares_points(place: str) -> bool:
-    """True where triangles read from ``place`` have points in common, in the order of the file; else each has three of its own."""
+    """True where triangles read from ``place`` share points, in the order of the file; False where each has three own points."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 

@@ -28,7 +28,7 @@ def read(path: Path) -> list[tuple[float, Floats, Ints]]:
 
 
 def _displacement(data: dict[str, Any], points: Floats) -> Any:
-    """The displacement among point ``data`` of a step; ValueError where there is none of the shape of ``points``."""
+    """The displacement among point ``data`` of a step; ValueError without one of the shape of ``points``."""
     name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
     if name is None:
         raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")

@@ -50,7 +50,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def both_lengths(run: Run, reference: Run, context: MeasurementContext) -> tuple[Floats, Floats]:
-    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured alike."""
+    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured in the same way."""
     inside = _carries(run, context) and _carries(reference, context)
     return _lengths(run, context, inside=inside), _lengths(reference, context, inside=inside)
 

@@ -103,7 +103,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
 
 
 def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed: Floats) -> _Worst:
-    """Depth beyond what is ``allowed`` (k,) at the points of a surface in pieces, with their ``gaps`` (k,) to a bone."""
+    """The greatest depth beyond the ``allowed`` (k,) one at the points of a surface in pieces, with ``gaps`` (k,) to a bone."""
     corners, reach = exempt.corners, exempt.reach
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])

@@ -249,7 +249,7 @@ def check_agreement(body: Body) -> None:
             if not off.max() <= SAME * (body.size + np.abs(found).max()):
                 x, y, z = places[np.argmax(off)]
                 got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
-                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")
+                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at shared places")
 
 
 def _check_start(body: Body) -> None:

@@ -82,7 +82,7 @@ class Decision:
     @property
     def _word(self) -> str:
         if self.listed:
-            return "acts, as it is listed" if self.needed else 'acts, as it is listed ("auto" would do without it)'
+            return "acts, as it is listed" if self.needed else 'acts, as it is listed ("auto" would leave it out)'
         if not self.needed:
             return "left out"
         if self.turned_out is not None:

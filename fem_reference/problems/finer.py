@@ -57,7 +57,7 @@ def _cut(mesh: Cells) -> tuple[Cells, Ints]:
     for i, node in enumerate(own):
         part, j = np.argwhere((nodes == node).all(axis=2))[0]
         shared[mesh.cells[:, i]] = names[:, part, j]
-    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # equal but for rounding
+    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # equal up to rounding
     facets = _facets(mesh, names, shares)
     return Cells(points, names.reshape(-1, len(own)), mesh.kind, mesh.degree, facets), shared
 

@@ -29,7 +29,7 @@ def called(piece: str, name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class DirectionsByPiece:
-    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; x where one has none."""
+    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; along x in pieces without fibres."""
 
     ranges: tuple[Range, ...]
     of: tuple[Directions | None, ...]

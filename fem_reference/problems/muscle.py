@@ -145,7 +145,7 @@ class MuscleProblem(Setup):
 
 
 def setup(case: MuscleCase) -> Setup:
-    """Read and check the surfaces of a case and choose its attachments; InputError names what is unusable."""
+    """Read and check the surfaces of a case and choose its attachments; InputError names the unusable part."""
     place = join(case.place, "muscle.surface")
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))

@@ -176,7 +176,7 @@ def _meshes(parts: Sequence[TetMesh]) -> TetMesh:
 
 
 def setup(case: MusclesCase) -> MusclesSetup:
-    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names what is unusable."""
+    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names the unusable part."""
     found = dict[str, Setup]()
     for i, part in enumerate(case.parts):
         with case.placed(i):

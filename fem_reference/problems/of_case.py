@@ -169,7 +169,7 @@ def scalar_case(case: Case) -> ScalarCase:
 
 
 def setup(case: Case) -> CaseSetup:
-    """The set-up of a case. InputError names what is unusable."""
+    """The set-up of a case; InputError names the unusable part."""
     if isinstance(case, MusclesCase):
         return muscles.setup(case)
     return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))

@@ -89,7 +89,7 @@ class FieldProblem:
 
 
 def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
-    """The problem of a case with ``refinements`` of its mesh; InputError names what is not usable."""
+    """The problem of a case with ``refinements`` of its mesh; InputError names the unusable part."""
     mesh = check(mesh_of(case))
     dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
@@ -239,7 +239,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
 
 
 def mesh_of(case: ScalarCase) -> FieldMesh:
-    """The mesh of a scalar case; InputError names what is unusable."""
+    """The mesh of a scalar case; InputError names the unusable part."""
     domain = case.domain
     if domain.mesh is not None:
         return _mesh_files(case, domain.mesh)

@@ -176,7 +176,7 @@ class Watch:
         """The decision on an effect: by the stress that it adds in the tetrahedra, of fibres by that alone."""
         effect = self.left[i]
         found = effect.indicator(now)
-        assert found is not None  # of what was left out
+        assert found is not None  # effects that were left out have one
         if stresses is not None:
             guessed = 0.0 if "fibre" in effect.needs else found.stress
             found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is

@@ -23,7 +23,7 @@ DATA_SETTING = "FEM_REFERENCE_DATA"
 # Further folders, separated as in PATH, that scene files may read files from.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 COMMAND = "command"  # the solver that runs a program, which a scene file cannot choose
-DELAUNAY = "delaunay"  # stands in place of the name of a file of triangles
+DELAUNAY = "delaunay"  # in place of the name of a file of triangles
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 

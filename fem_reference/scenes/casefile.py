@@ -121,7 +121,7 @@ def muscle(case: Case, place: str | None = None) -> MuscleCase:
 
 
 def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Case:
-    """The ``case`` of ``table`` with its negative control applied; ``table`` stays as it is."""
+    """The ``case`` of ``table`` with its negative control applied; ``table`` is not changed."""
     place, control = str(path), case.negative_control
     if control is None:
         raise InputError(join(place, "negative_control"), "None", "a key to change, its value, and why")
@@ -142,7 +142,9 @@ def _check_negative_control(case: Case, changed: Case) -> None:
         return
     if changed.model_copy(update={"negative_control": control}) == case:
         raise _wrong(case, "value", f"a value that changes {control.key}")
-    raise _wrong(case, "key", "a key that changes what is solved, which alone can turn a verdict: of an effect, say")
+    raise _wrong(
+        case, "key", "a key that changes the solution, such as one of an effect: no other key can change a verdict"
+    )
 
 
 def _wrong(case: Case, part: str, want: str) -> InputError:

@@ -141,7 +141,7 @@ class CaseBone(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.surface is None) != (self.unit is None):
-            raise ValueError('"unit" beside "surface" and only there')
+            raise ValueError('"unit" with "surface" and only with it')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
             if self.surface is None and key in self.model_fields_set:
                 raise ValueError(f'"{key}" beside "surface" only: a closed form has none')

@@ -153,8 +153,8 @@ WRONG_BONES = [
     ),
     ("bone[0]", {"name": "wall"}, "bone[0]: got {'name': 'wall'}, want exactly one of \"surface\", \"half_space\""),
     ("bone[0]", {"name": "wall", "surface": "wall.ply"}, "bone[0]: got {"),
-    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" beside "surface" and only there'),
-    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" beside "surface" and only there'),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" with "surface" and only with it'),
+    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" with "surface" and only with it'),
     (
         "bone[0]",
         {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},
