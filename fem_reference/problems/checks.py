@@ -69,7 +69,8 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
     if (
         not isinstance(size, tuple | list | np.ndarray)
-        or np.shape(size) != (3,)
+        or getattr(size, "ndim", 1) != 1
+        or len(size) != 3
         or not all(_is_number(one) and one > _SHORTEST for one in size)
     ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
