@@ -1,6 +1,4 @@
-"""Penetration of a closed body and a bone: the depth where their surfaces cross or one is within the other, and the volume of
-the body within the bone, by random sampling.
-"""
+"""Penetration of a closed body and a bone: its depth, and the volume of the body within the bone, by random sampling."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,10 +15,10 @@ from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.geometry.skins import edge_lengths
+from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-# So many winding numbers take as long as a tree for them.
+# Points whose winding numbers take as long as building a tree for them.
 _FEW = 20
 # A factor on a distance, for its rounding.
 _MORE = 1 + 1e-9
@@ -33,8 +31,6 @@ _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
 _TOO_MANY = 1e6
 # The number of rounds of subdivision, the most cubes after each, and the most points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# The quarters of a triangle, among its corners and the middles of the edges that leave these.
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 # A triangle is sampled in parts of down to an eighth of its size.
 _PARTINGS = 3
 
@@ -44,8 +40,8 @@ Distance = Callable[[Floats], Floats]
 @dataclass(frozen=True, eq=False)
 class Depths:
     """Penetration depths (k,) [mm] of some vertices and triangles of a body and then of a bone, and their ``places`` (k, 3) [mm];
-    ``at`` are their numbers (k,), rising. All others are outside. Only triangles that cross the other surface are sampled, where
-    they are deepest.
+    ``at`` are their numbers (k,), in ascending order. All others are outside. Only triangles that cross the other surface are
+    sampled; the deepest sample counts.
     """
 
     at: Ints
@@ -107,7 +103,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
 
 
 def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) that a closed ``body`` winds round; of few without a tree of its triangles."""
+    """Mask (n,) of the ``points`` (n, 3) that a closed ``body`` winds round; for few points without a tree of its triangles."""
     found, some = np.zeros(len(points), bool), _in_box(body, points)
     if len(some) > _FEW:
         found[some] = inside(body, points[some])
@@ -118,20 +114,15 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def _in_box(body: Surface, points: Floats) -> Ints:
     """The ``points`` (k,) of n within the box around the points of a ``body``."""
-    low, high = _box(body)
+    low, high = body.points.min(axis=0), body.points.max(axis=0)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-
-
-@lru_cache(maxsize=4)
-def _box(body: Surface) -> tuple[Floats, Floats]:
-    return body.points.min(axis=0), body.points.max(axis=0)
 
 
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of triangles ``crossing`` another
-    surface where they are deepest, and of vertices reached from their inside corners, or from the ``tips`` that are ``within``;
+    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of the deepest sample of triangles
+    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``;
     ``tips`` are of parts without such triangles.
     """
     points, corners = surface.points, surface.triangles[crossing]
@@ -194,15 +185,14 @@ class Shared(NamedTuple):
 def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
-    Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
-    these, the same every time. On average the count is exact. Its standard deviation is at most half the volume of one point,
-    times the square root of the number of points in cubes on the border of the overlap.
+    Space is cut into cubes, those that may contain a part of the overlap into smaller ones, and 4000 to 8000 random points are
+    drawn in these, the same every time. The expected volume is exact. Its standard deviation is at most half the volume of one
+    point, times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
     [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
     [mm] on all its sides: where all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
-    enters the body, and the body does not reach into the surface up to its middle. It is NaN where the surface has blown up
-    beyond a cubic metre.
+    enters the body and the middle of the body is outside the surface. It is NaN where the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
@@ -235,17 +225,14 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True where a counted triangle enters the body; tested at its vertices, and near the body at ever smaller parts."""
+    """True where a counted triangle enters the body; tested at its vertices, and near the body at those of smaller parts."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True
-        near = away.min(axis=1) < edge_lengths(corners).max(axis=1)
-        middles = (corners[near] + np.roll(corners[near], -1, axis=1)) / 2  # of the edge that leaves each corner
-        between = distance(middles.reshape(-1, 3)).reshape(-1, 3)
-        corners = np.concatenate([corners[near], middles], axis=1)[:, _QUARTERS].reshape(-1, 3, 3)
-        away = np.concatenate([away[near], between], axis=1)[:, _QUARTERS].reshape(-1, 3)
+        corners = quartered(corners[away.min(axis=1) < edge_lengths(corners).max(axis=1)])
+        away = distance(corners.reshape(-1, 3)).reshape(-1, 3)
     return bool((away < 0).any())
 
 

@@ -32,8 +32,11 @@ def check_unit(fibre: Directions, places: Floats) -> None:
 def check_normals(body: Body) -> None:
     """Raise InputError where the ``normal`` of a law is along the fibres, so that no direction across both is known."""
     laws = [effect for effect in body.effects if isinstance(effect, HolzapfelOgden)]
-    for places in body.mesh.places() if laws and body.fibre is not None else ():
-        fibres = body.fibre(np.arange(len(places)), places)
+    fibre = body.fibre
+    if fibre is None or not laws:
+        return
+    for places in body.mesh.places():
+        fibres = fibre(np.arange(len(places)), places)
         for law in laws:
             across = np.linalg.norm(np.cross(law.normal, fibres), axis=1) / math.hypot(*law.normal)
             worst = int(np.argmin(across))
