@@ -37,7 +37,7 @@ def test_a_solver_that_leaves_out_what_acts_is_no_success() -> None:
         ("round_edge.tendon", ("contact",), "fibre_passive"),
     ):
         found = running.cell(running.Posed(CASES[name]), choice, takes)
-        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out what acts here: {lacks}")
+        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out effects of this case: {lacks}")
     assert running.cell(running.Posed(CASES["at_rest.millimetres"]), choice, ()).verdict == "ok"
 
 
@@ -126,7 +126,7 @@ def test_a_busy_machine_turns_no_verdict(monkeypatch) -> None:
     waits[0], works[0] = 10.0, 0.0
     found = cell("at_rest.millimetres", "pbd")
     assert (found.verdict, found.status) == ("inconclusive", "stalled")
-    assert "by the clock, and not 2 s of processor time" in found.sentence
+    assert "by the clock, but less than 2 s of processor time" in found.sentence
     assert (
         running.signal.getitimer(running.signal.ITIMER_PROF)
         == running.signal.getitimer(running.signal.ITIMER_REAL)
