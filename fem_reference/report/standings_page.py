@@ -33,7 +33,7 @@ def _columns(rows: Iterable[Standing]) -> list[tuple[str, str, str]]:
 
 
 def text(found: Standings) -> str:
-    """The rows, what is missing and what changed, as lines of text."""
+    """The rows, the missing ones and the changes, as lines of text."""
     lines = [_line(row) for case in found.cases for row in found.of(case)]
     lines += [f"{name}: left out, {why}" for name, why in found.missing.items()]
     return "\n".join([*lines, *(f"changed: {line}" for line in found.changes)])

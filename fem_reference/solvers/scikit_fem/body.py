@@ -47,7 +47,7 @@ class ScikitBodySettings(Record):
 
 
 def _check_known(body: Body) -> None:
-    """Raise InputError where a body has a part that this solver knows nothing of."""
+    """Raise InputError where a body has a part that this solver does not support."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without it, as this solver has no contact")

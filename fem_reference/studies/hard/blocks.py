@@ -1,4 +1,4 @@
-"""Blocks as problems: an axis-aligned lattice of tetrahedra whose skin is the surface that solvers get."""
+"""Blocks as problems: an axis-aligned lattice of tetrahedra, whose boundary is the surface given to solvers."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -21,12 +21,12 @@ from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
-# What blocks are of where a case says nothing else: muscle's usual matrix.
+# The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
-# The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
+# The bones of held faces are balls: their radius and distance in sizes of the block; nothing meets them there.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # of the block's size: rounding of what two holds do alike
+_SAME = 1e-9  # of the block's size: the rounding between equal motions of two holds
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -66,7 +66,7 @@ class Moved:
     cell: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Positions of rest points (n, 3) [mm]; a point is moved at random alike, whichever others are asked for."""
+        """Positions of rest points (n, 3) [mm]; the random displacement of a point does not depend on the other points."""
         match self.start.kind:
             case "point":
                 return np.broadcast_to(self.middle, points.shape).copy()
@@ -95,13 +95,13 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
         shares[:, k] = np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])[nodes[:, k]]
     if block.jitter:
         random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
-        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, and edges and corners where they are
+        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat; edges and corners stay in place
         shares += random
     return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
-    """Indices (k,) of those ``nodes`` (n, 3) of the lattice that are on a ``face``."""
+    """Indices (k,) of the ``nodes`` (n, 3) of the lattice on a ``face``."""
     axis = "xyz".index(face[0])
     return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
 
@@ -123,7 +123,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """InputError where two holds would take the vertices that they share to different places: for most solvers one of them wins."""
+    """InputError where two holds move their shared vertices to different places: most solvers would obey only one of them."""
     assert hard.frames is not None  # beside a block
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})

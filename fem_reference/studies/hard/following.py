@@ -1,4 +1,4 @@
-"""Runs of hard cases: followed frame by frame as their health is measured, and repeated in other load steps and on other meshes."""
+"""Runs of hard cases: their frames, whose health is measured, and their repetition in other load steps and on other meshes."""
 
 import time
 from collections import Counter
@@ -24,18 +24,18 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.studies.hard.records import Hard, StepCounts, task_of
 
-_MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
+_MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
-_CUTS = 64  # a load step is cut to this part of itself before it is given up
-MOVED = 0.1  # of a cell of a block, by which its points are moved at most
-SIZES = 0.03  # of the size of the tetrahedra of a shipped case, by which it differs at most
-LONGEST = 60.0  # [s] of processor time of a run that is repeated
+_CUTS = 64  # the greatest factor by which a load step is cut before it is given up
+MOVED = 0.1  # greatest random displacement of points of a block, in cells
+SIZES = 0.03  # greatest relative change of the size of tetrahedra of a shipped case
+LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """The machine was too busy for a conclusion about a run; the reason."""
+    """Raised where the machine was too busy for a conclusion about a run."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
@@ -81,7 +81,7 @@ def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
     whole = len(tets) == len(frames)
 
     def scalar(name: str) -> Floats | None:
-        """A scalar of all frames (f,), None where not all have it."""
+        """A scalar of all frames (f,); None where a frame lacks it."""
         found = [frame.scalars[name] for frame in frames if name in frame.scalars]
         return np.array(found) if len(found) == len(frames) else None
 
@@ -104,14 +104,14 @@ def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
 
 @dataclass(frozen=True)
 class SameEnd:
-    """A comparison of runs that should end alike: ``same`` where those that reached the end did; a ``sentence`` on each."""
+    """A comparison of runs that should end alike: ``same``: those that reached the end agree; a ``sentence`` about them."""
 
     same: bool
     sentence: str
 
 
 def farthest(followed: Followed) -> StepCounts | None:
-    """Load steps to the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+    """Load steps to the frame at which a run is farthest from its first state; None for a run that did not leave it."""
     moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
     return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
@@ -138,7 +138,7 @@ def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> S
 
 
 def jittered(hard: Hard, number: int) -> Hard:
-    """The case on the mesh of a ``number``, the same each time."""
+    """The case on a random mesh; the seed ``number`` determines it."""
     if hard.block is not None:
         jitter = max(hard.block.jitter, MOVED)
         return hard.model_copy(update={"block": hard.block.model_copy(update={"jitter": jitter, "seed": number})})
@@ -159,7 +159,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
             other, found = solve(jittered(hard, number))
         except InputError as error:
             if not ended:
-                return SameEnd(True, f"no jitters: {error}")
+                return SameEnd(True, f"no run on other meshes: {error}")
             ended["refused"] += 1
             continue
         ended[other.status] += 1
@@ -167,14 +167,14 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
         reached.append(found.numbers[-1])
         off.append(_apart(followed, found))
         if time.process_time() - begin + elsewhere > LONGEST * number:
-            return SameEnd(True, f"no jitters, of which one takes more than {LONGEST:g} s")
+            return SameEnd(True, f"no runs on other meshes, as one takes more than {LONGEST:g} s")
     words = ", ".join(f"{many} {status}" for status, many in ended.most_common())
     if off:
         words += f", up to frame {' to '.join(map(str, sorted({min(reached), max(reached)})))}"
         words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
     statuses = set(ended) - {"refused"}
     alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses
-    return SameEnd(alike, f"jitters: {words}")
+    return SameEnd(alike, f"on other meshes: {words}")
 
 
 def _apart(one: Followed, other: Followed) -> float:

@@ -1,4 +1,4 @@
-"""Hard cases as files below ``cases/hard`` describe them, with their variants."""
+"""Records of hard cases, read from files below ``cases/hard``, with their variants."""
 
 import math
 from collections.abc import Iterator
@@ -34,11 +34,11 @@ _OWN: dict[str, dict[str, Any]] = {
 
 
 class Lattice(Record):
-    """A block of ``size`` from its ``corner``, in so many ``cells`` along each axis, each cut into six tetrahedra.
+    """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
-    ``grading``: along each axis, the last cell over the first. ``jitter``: how far nodes are moved at random inside the block and
-    its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres, along which the lines run that are measured.
-    ``points_apart`` [mm]: how far apart points are on which bones press and springs pull, by default as on muscles.
+    ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
+    block and its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres and of the measured lines. ``points_apart``
+    [mm]: the spacing of points on which bones press and springs pull, by default as on muscles.
     """
 
     size: Point
@@ -71,8 +71,8 @@ class Hold(Record):
 
 
 class Start(Record):
-    """The body at the first frame in place of its rest state: points moved at ``random`` by an ``amount`` of the size of
-    a cell, or the whole body collapsed to its middle ``point`` or ``plane`` across z or turned ``inside out``.
+    """The state at the first frame in place of rest: points moved at ``random`` by up to an ``amount`` of cells, or the whole body
+    collapsed to its middle ``point`` or ``plane`` across z, or turned ``inside out``.
     """
 
     kind: Literal["random", "point", "plane", "inside out"]
@@ -80,7 +80,7 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case``, where it is ``quick`` as tests solve it, with ``changes`` of its keys."""
+    """A shipped ``case``, with its ``quick`` settings for tests if so, and with ``changes`` of its keys."""
 
     case: str
     quick: bool = False
@@ -93,7 +93,7 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of even load steps (``counts``) in which the reference goes to the frame ``until``: they shall end alike."""
+    """Numbers of equal load steps (``counts``) in which the reference goes to the frame ``until``; all should end alike."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
@@ -102,11 +102,11 @@ class StepCounts(Record):
 class Hard(Record):
     """A hard case: a ``block`` with what acts on it, or a ``shipped`` case.
 
-    ``healthy`` says in words what a healthy run shows, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers
-    that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with
-    a status; ``contrast``: what it shows that goes wrong, so that a run should pass its bound. ``by_effects``: effects are all
-    that acts, and solvers that simulate none have nothing to do. ``settings``: by solver, those that differ from Table 5.1.
-    ``steps``: in which numbers of load steps the reference is asked for the same end state.
+    ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
+    case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
+    should end with a status; ``contrast``: the defect that the case demonstrates, so that a run should exceed its bound.
+    ``by_effects``: only effects act, so that the case does not apply to solvers that simulate none. ``settings``: by solver, those
+    that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
     """
 
     title: str
@@ -134,9 +134,9 @@ class Hard(Record):
     def _check_quantities(cls, bounds: tuple[Bound, ...]) -> tuple[Bound, ...]:
         strange = [bound.quantity for bound in bounds if bound.quantity not in health.QUANTITIES]
         if strange:
-            raise ValueError(f"quantities that are among {', '.join(health.QUANTITIES)}, as {strange[0]} is not")
+            raise ValueError(f"quantities among {', '.join(health.QUANTITIES)}; {strange[0]} is none of them")
         if all(bound.quantity == "from_reference" for bound in bounds):
-            raise ValueError("another quantity beside from_reference, which a run without a reference has not")
+            raise ValueError("another quantity beside from_reference, which a run without a reference lacks")
         return bounds
 
     @field_validator("hold")
@@ -178,17 +178,17 @@ def choices() -> dict[str, SolverChoice]:
 
 
 def task_of(solver: str, task: Task) -> Task:
-    """The task that a solver is asked for in a case of a ``task``: the second solver has none for muscles but that of bodies."""
+    """The task of a solver in a case of a ``task``: the second solver solves muscles as bodies."""
     return "solve_body" if task == "solve" and solver == SECOND else task
 
 
 def folders() -> list[str]:
-    """The folders of hard cases that there are."""
+    """The names of the folders of hard cases."""
     return sorted(path.parent.name for path in FOLDER.glob("*/case.toml"))
 
 
 def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
-    """Every hard case, or those of folders or variants of these ``names``; InputError where there is none of a name."""
+    """Every hard case, or those in folders or variants of these ``names``; InputError for a name without a case."""
     found = [hard for folder in folders() for hard in read(FOLDER / folder / "case.toml")]
     own = [{hard.name, hard.name.partition(".")[0]} for hard in found]
     for name in names:
@@ -198,7 +198,7 @@ def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one cannot be posed."""
+    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one is invalid."""
     table, folder = texts.toml(path), path.parent.name
     if "variant" not in table:
         yield _hard(table, folder, str(path))
@@ -225,7 +225,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         table = table | {"effect": casefile.effects(table["effect"], where)}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
-        want = 'nothing beside "no_solution", which no run should reach the end of'
+        want = 'nothing beside "no_solution", as no run should reach its end'
         raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
     scene = hard.shipped.read() if hard.shipped else None
     task: Task = scene.task if scene else "solve"

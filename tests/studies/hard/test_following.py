@@ -100,7 +100,7 @@ def test_jitters_are_other_meshes_of_the_same_body_compared_at_the_same_material
 
     same = following.on_meshes(hard, bent(hard), 2, bent)
     assert same == following.SameEnd(
-        True, "jitters: 2 converged, up to frame 0, apart by 0.5 % at most, 0.25 % in the median"
+        True, "on other meshes: 2 converged, up to frame 0, apart by 0.5 % at most, 0.25 % in the median"
     )
     assert not following.on_meshes(hard, bent(hard), 3, bent).same
 
