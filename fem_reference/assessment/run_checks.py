@@ -205,8 +205,8 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else what
-    the bones carry of these. An effect of a user's own may be such a load, so that nothing is known with one.
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else equal to
+    these. An effect of a user's own may be such a load, so there is no check with one.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -254,7 +254,10 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            give = _give(problem, bone, float(pressures[i]), apart)
+            assert problem.contact is not None  # as there are obstacles
+            known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
+            # The compliance of contact, the error of the distance, and the part between contact points.
+            give = float(pressures[i]) / problem.contact.stiffness + known + _BETWEEN * apart
             check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
@@ -276,15 +279,6 @@ def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, 
 @lru_cache(maxsize=8)
 def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
-
-
-def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] of a bone: the give of contact under the recorded ``pressure`` [MPa], the error of the bone's
-    distance, and the part between contact points, which are half of ``apart`` [mm] apart.
-    """
-    assert problem.contact is not None  # called only with contact
-    known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
-    return pressure / problem.contact.stiffness + known + _BETWEEN * apart
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:

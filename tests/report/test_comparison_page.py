@@ -144,7 +144,7 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     nowhere = replace(failed, positions=np.full_like(positions, NAN))
     apart = {"quick": measured(quick, nowhere.positions)}
     text = html(replace(one, reference=nowhere, deviations=apart))
-    assert "No frame was reached, so that nothing could be measured against it." in text
+    assert "No frame was reached, so nothing could be measured against it." in text
     assert "Deviations at their worst frames" not in text
     assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     assert "<h2>Cost</h2>" in text
