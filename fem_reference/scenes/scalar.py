@@ -10,6 +10,10 @@ from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record, increasing, one_of
 from fem_reference.scenes.case import Case, Standard
 
+_Nodes = Annotated[
+    tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
+]
+
 
 class Interval(Record):
     """``count`` nodes from ``start`` to ``end``, both included; where ``seed`` is given, those between are drawn at random."""
@@ -48,12 +52,7 @@ class Domain(Record):
     """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
-    nodes: (
-        Annotated[
-            tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
-        ]
-        | None
-    ) = None
+    nodes: _Nodes | None = None
     mesh: MeshFiles | None = None
     surface: SurfaceFile | None = None
 
@@ -66,7 +65,7 @@ class Boundary(Record):
     ``on`` an end of an interval or the ``rim`` of triangles, there only ``where`` a formula is above zero at every vertex of a
     facet (an edge counts only with both its ends): the ``value`` of the field (Dirichlet) or its ``slope`` along the outward
     normal (Neumann). Or ``bounds``, a file as listing 4.5 loads it: a row of vertices, the first of all being 1, and a row of the
-    values that they are fixed at. What no condition names has slope 0.
+    values that they are fixed at. Elsewhere the slope is 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None
