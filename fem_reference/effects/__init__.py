@@ -11,7 +11,6 @@ never branches on a parameter and uses it with operators and ``state.functions``
 """
 
 import importlib
-import pkgutil
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -19,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, field_validator
 
-from fem_reference.foundations import outside
+from fem_reference.foundations import modules, outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit, Range
@@ -236,12 +235,12 @@ class FieldEffect(Record):
 
 def names(kind: type[Record] = Effect) -> list[str]:
     """The existing effects of a ``kind``, by their names in scene files."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__) if issubclass(_record(module.name), kind))
+    return [name for name in modules.names(__path__) if issubclass(_record(name), kind)]
 
 
 def find(name: str) -> type[Record]:
     """The record of the effect ``name``; KeyError where there is none."""
-    if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
+    if name not in modules.names(__path__):
         raise KeyError(name)
     return _record(name)
 

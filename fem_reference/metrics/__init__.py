@@ -6,7 +6,6 @@ and the standard that it is measured ``AGAINST``: the reference (or the rest sta
 """
 
 import importlib
-import pkgutil
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -14,6 +13,7 @@ from typing import Any, Literal, Protocol, cast, overload
 
 import numpy as np
 
+from fem_reference.foundations import modules
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
@@ -199,8 +199,7 @@ def metric(name: str) -> Metric:
 
 def names(against: Collection[Standard] | None = None) -> list[str]:
     """The names of all metrics, or of those measured ``against`` one of these standards."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return [name for name in found if against is None or metric(name).AGAINST in against]
+    return [name for name in modules.names(__path__) if against is None or metric(name).AGAINST in against]
 
 
 @cache

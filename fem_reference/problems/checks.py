@@ -10,9 +10,8 @@ from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
-from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import friction, regions, tendons
+from fem_reference.problems import directions, friction, regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -26,7 +25,6 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
-_UNIT = 1e-6  # the tolerance on the length of a unit vector
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume counts as flat
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
@@ -69,8 +67,12 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
-    three = isinstance(size, tuple | list | np.ndarray) and getattr(size, "ndim", 1) == 1 and len(size) == 3
-    if not (three and all(_is_number(one) and one > _SHORTEST for one in size)):
+    if (
+        not isinstance(size, tuple | list | np.ndarray)
+        or getattr(size, "ndim", 1) != 1
+        or len(size) != 3
+        or not all(_is_number(one) and one > _SHORTEST for one in size)
+    ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
         raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
@@ -86,8 +88,12 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
 
 def check_frames(frames: object, place: str) -> None:
     """Raise InputError unless ``frames`` are increasing numbers."""
-    listed = isinstance(frames, Sequence | np.ndarray) and not isinstance(frames, str | bytes) and len(frames) > 0
-    if not (listed and all(_is_number(one) for one in frames)):
+    if (
+        isinstance(frames, str | bytes)
+        or not isinstance(frames, Sequence | np.ndarray)
+        or len(frames) == 0
+        or not all(_is_number(one) for one in frames)
+    ):
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "frame numbers that are each later than the one before")
@@ -219,30 +225,17 @@ def _check_needs(body: Body) -> None:
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
     for places in body.mesh.places():
-        _check_unit(body.fibre, places)
-
-
-def _check_unit(fibre: Directions, places: Floats) -> None:
-    """Raise InputError unless the directions at ``places`` (n, 3) [mm], one in each cell, are unit vectors."""
-    cells = np.arange(len(places))
-    try:
-        found = np.asarray(fibre(cells, places), float)
-    except Exception as error:  # any error in a function of the caller
-        raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
-    if found.shape != (len(cells), 3):
-        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
-    lengths = np.linalg.norm(found, axis=1)
-    worst = int(np.argmax(np.where(np.isfinite(lengths), np.abs(lengths - 1), np.inf)))
-    if not abs(lengths[worst] - 1) <= _UNIT:
-        raise InputError("fibre", f"a direction of length {lengths[worst]:.6g} in cell {worst}", "unit vectors")
+        directions.check_unit(body.fibre, places)
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where a part of the body has no law of a kind (``regions.check``), a tendon or friction is beside tension at
-    rest, two regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed. Displacements are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where a part of the body has no law of a kind (``regions.check``), the normal of a law is along fibres, a
+    tendon or friction is beside tension at rest, two regions of its surface prescribe different exact displacements at shared
+    places, or a path of motion cannot be followed. Displacements are compared at all frames, all stops, and the middles between
+    them.
     """
     regions.check(body)
+    directions.check_normals(body)
     tendons.check(body)
     friction.check(body.frictions, begun=body.begun)
     ends = np.unique([*body.frames, *body.stops])

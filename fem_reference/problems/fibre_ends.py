@@ -97,6 +97,14 @@ def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:
     return np.stack([at[lines.offsets[:-1]], at[lines.offsets[1:] - 1]], axis=1)
 
 
+def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]:
+    """The mean length of ``lines`` at rest with the straight tendons of their ``ends`` [mm], and the facts of these."""
+    if ends is None:
+        return {"fibre_length_mean_mm": float(lines.lengths().mean())}
+    tendons = np.linalg.norm(ends.tendons - ends_of(lines), axis=2)
+    return {"fibre_length_mean_mm": float((lines.lengths() + np.nansum(tendons, axis=1)).mean())} | ends.facts
+
+
 def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
     """The ends of the ``fibres`` of a muscle by its attachments and the parts that they exempt from contact, None without any.
 

@@ -53,7 +53,7 @@ from fem_reference.problems.contact import (
     check_thickness,
     nearest_at_rest,
 )
-from fem_reference.problems.fibre_ends import attached_ends, completed
+from fem_reference.problems.fibre_ends import attached_ends, completed, facts_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup, joints_of
@@ -175,7 +175,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         ends = attached_ends(own.attached, own.exempt, fibres)
     asked = any("fibre" in effect.needs for effect in (*case.effects, *(one.effect for one in case.decisions)))
     problem = assembled(rest, mesh, case.effects, (fibres, fibre if asked else None), spacing(rest.surface))
-    facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known | ({} if ends is None else ends.facts)
+    facts = _mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known | facts_of(fibres, ends)
     return replace(problem, mesh_facts=facts, seconds=time.perf_counter() - begin)
 
 

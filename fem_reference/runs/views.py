@@ -34,8 +34,8 @@ def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
     )
     if (state := frame.state) is not None:
         before = state.before[span.cells] if len(state.before) else state.before
-        own = {"displacement": state.displacement[span.cells], "pressure": state.pressure[span.cells]}
-        state = replace(state, before=before, **own)
+        displacement, pressure = state.displacement[span.cells], state.pressure[span.cells]
+        state = replace(state, before=before, displacement=displacement, pressure=pressure)
     return replace(
         frame,
         surface=frame.surface[span.vertices],

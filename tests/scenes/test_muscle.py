@@ -58,9 +58,10 @@ def test_attachments_may_be_none(bar: Path) -> None:
 
 def test_loads_of_a_kind_act_on_different_parts(bar: Path) -> None:
     tables = [{"name": "neo_hooke", "mu": "1 kPa"}, PRESSURE, PRESSURE | {"on": "end"}]
-    scene = changed(bar, "effect", tables)
+    soft = {"attachment[1].stiffness": "1 MPa/mm"}
+    scene = casefile.read(bar, changes=soft | {"effect": tables})
     assert [effect.title for effect in scene.effects] == ["NeoHooke", "Pressure on free", "Pressure on end"]
-    assert scene.key != changed(bar, "effect", tables[:2]).key
+    assert scene.key != casefile.read(bar, changes=soft | {"effect": tables[:2]}).key
 
 
 @pytest.mark.parametrize(("key", "value", "message"), WRONG, ids=lambda entry: str(entry)[:40])

@@ -5,12 +5,12 @@ bit, and a truncated file is refused.
 """
 
 import importlib
-import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from fem_reference.foundations import modules
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.io.soup import Soup
 
@@ -36,7 +36,7 @@ class Format:
 def formats() -> dict[str, Format]:
     """Every format, by the suffix of its files; TypeError where a module defines none, or the suffix of another."""
     found: dict[str, Format] = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")):
+    for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")
         if not isinstance(one, Format) or not one.suffixes:
             raise TypeError(f"io/formats/{name}: FORMAT is {one!r}, want a Format with a suffix")
