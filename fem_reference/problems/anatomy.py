@@ -240,7 +240,7 @@ def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
 
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
-    it, which scales the shear by their tension. Traced and mapped fibres are parallel to the axis, except for pennation and rotation.
+    it, which scales the shear by their tension. Traced and mapped fibres follow the axis, except for pennation and rotation.
     """
     turning = _turning(case)
     if (lines := _given(case)) is None:
