@@ -120,12 +120,12 @@ def spent_since(before: MachineTime) -> dict[str, str]:
     return found if load is None else found | {"load by other processes": f"{100 * load:.0f} % of the machine"}
 
 
-def peak_memory() -> float:
-    """The peak memory [MB] of this process since :func:`forget_peak_memory` or its start."""
+def peak_memory(process: int | None = None) -> float:
+    """The peak memory [MB] since :func:`forget_peak_memory` or the start; of another ``process``, 0 where it is not reported."""
     with suppress(OSError, StopIteration):
-        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        lines = Path(f"/proc/{process or 'self'}/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return 0.0 if process else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 @contextmanager
