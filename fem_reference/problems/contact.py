@@ -113,7 +113,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
-        want = f"less: its middle is {half:.3g} mm deep, and from there no side is nearer"
+        want = f"less: its middle is {half:.3g} mm deep, where no side is nearer than another"
         raise InputError(f'bone "{name}"', got, want)
     return nearest
 

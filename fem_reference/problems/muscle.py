@@ -244,9 +244,9 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
         place = join(case.place, f"attachment[{i}]")
         vertices = pick(case, i, surface, by_name[attachment.bone].surface)
         if len(vertices) == 0:
-            raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
+            raise InputError(place, "no vertex of the muscle", "an attachment that selects vertices")
         if taken[vertices].any():
-            got = f"vertex {vertices[taken[vertices]][0]}, which another attachment has"
+            got = f"vertex {vertices[taken[vertices]][0]}, which belongs to another attachment"
             raise InputError(place, got, "each vertex once")
         taken[vertices] = True
         bone, tendon = by_name[attachment.bone], tendon_of(case, i)
