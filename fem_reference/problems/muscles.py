@@ -108,16 +108,13 @@ class MusclesProblem:
     def rest(self) -> AtRest:
         """All shapes that its frames move, those of one muscle after those of another."""
         found = list(self.problems.values())
-        starts, lines = [0], list[Floats]()
-        for one in found:
-            starts += (starts[-1] + one.fibres.offsets[1:]).tolist()
-            lines.append(one.fibres.points)
+        counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]
         along = None
         if any(one is not None for one in known):
             blank = [np.tile([1.0, 0.0, 0.0], (len(one.mesh.tets), 1)) for one in found]
             along = np.concatenate([no if one is None else one for one, no in zip(known, blank, strict=True)])
-        fibres = Polylines(np.concatenate(lines), np.array(starts))
+        fibres = Polylines(np.concatenate([one.fibres.points for one in found]), np.cumsum([0, *counts]))
         return AtRest(_surfaces([one.surface for one in found]), fibres, _meshes([one.mesh for one in found]), along)
 
     @property

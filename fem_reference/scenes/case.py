@@ -185,7 +185,7 @@ class Case(Record):
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
         folders = [self.folder, HOME / "meshes", *map(Path, filter(None, settings.split(os.pathsep)))]
         if not any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
-            want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
+            want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER for another folder"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     def check_solvers(self) -> None:

@@ -10,6 +10,10 @@ from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record, increasing, one_of
 from fem_reference.scenes.case import Case, Standard
 
+_Nodes = Annotated[
+    tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
+]
+
 
 class Interval(Record):
     """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` those between are at random positions."""
@@ -48,12 +52,7 @@ class Domain(Record):
     """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
-    nodes: (
-        Annotated[
-            tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
-        ]
-        | None
-    ) = None
+    nodes: _Nodes | None = None
     mesh: MeshFiles | None = None
     surface: SurfaceFile | None = None
 
