@@ -45,7 +45,7 @@ WRONG = [
 def test_attachments_may_be_none(bar: Path) -> None:
     start, end = SCENE.index("[[attachment]]"), SCENE.index("[[effect]]")
     text = SCENE[:start] + SCENE[end:]
-    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want a name that is there: there is none'):
+    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want none, as none is defined'):
         casefile.read(written(bar, text))
     traced = text[text.index("[fibres.traced]") : text.index("[frames]")]
     lines = 'fibres.polylines = { file = "fibres.vtk", unit = "mm" }\n'
@@ -153,8 +153,8 @@ WRONG_BONES = [
     ),
     ("bone[0]", {"name": "wall"}, "bone[0]: got {'name': 'wall'}, want exactly one of \"surface\", \"half_space\""),
     ("bone[0]", {"name": "wall", "surface": "wall.ply"}, "bone[0]: got {"),
-    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" beside "surface" and only there'),
-    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" beside "surface" and only there'),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" with "surface" and only with it'),
+    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" with "surface" and only with it'),
     (
         "bone[0]",
         {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},
