@@ -60,11 +60,10 @@ class Candidate(SolverChoice):
 
 
 class Expectation(Record):
-    """A number that a measure of this case must have.
+    """A ``truth`` that a measure of this case must meet ``within`` a tolerance.
 
-    ``of`` is ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic`` may be left out where the
-    metric has one only; ``frame`` a number or ``"any"``; ``truth`` and ``within`` text with a unit, or numbers where the metric
-    has none.
+    ``of``: ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic``: optional if the metric has
+    only one; ``frame``: a number or ``"any"``; ``truth`` and ``within``: text with a unit, or numbers if the metric has no unit.
     """
 
     of: str

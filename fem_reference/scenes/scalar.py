@@ -87,7 +87,7 @@ class Boundary(Record):
 
 class Element(Record):
     """Lagrange elements of ``order`` 1 or 2, and the ``form``: plain ``galerkin``; ``supg``, stabilised along the flow; or
-    ``auto``, which is supg where the mesh Peclet number is above 1 anywhere, else galerkin.
+    ``auto``, which is supg if the mesh Peclet number is above 1 anywhere, and galerkin otherwise.
     """
 
     order: Literal[1, 2]
