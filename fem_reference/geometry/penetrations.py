@@ -121,8 +121,8 @@ def _in_box(body: Surface, points: Floats) -> Ints:
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of triangles ``crossing`` another
-    surface where they are deepest, and of vertices reached from their inside corners, or from the ``tips`` that are ``within``;
+    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of the deepest sample of triangles
+    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``;
     ``tips`` are of parts without such triangles.
     """
     points, corners = surface.points, surface.triangles[crossing]
