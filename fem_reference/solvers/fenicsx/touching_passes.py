@@ -215,23 +215,25 @@ class Pass:
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
-        they are behind the facet that they were near, or passed one on their path, and are not in contact. Points inside begin
-        behind their facet: their paths are raised to the smoothing, at most by what the facet reaches, as less deep ones are met.
+        they are behind the facet that they were near, or passed one on their path, and are not in contact. Paths that begin inside,
+        or so near that flat pieces of a facet may be in front, are followed from in front too: raised by at most what the facet
+        reaches, as less deep points are met.
         """
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
-        free[met.points] = False
+        free[met.points], none = False, np.zeros(0, np.int64)
         old, new = self.other.nodes(before), self.other.nodes(now)
         near = self.met(before, float(self.other.balls(old)[1].max()), None, (before, last))
         near = near.some(np.flatnonzero(free[near.points]))
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
-        inner = last.some(np.flatnonzero(last.gap <= 0))
-        raised = np.minimum(self.law.smoothing - inner.gap, self._reach(old)[inner.facets])
-        for places in (starts, ends):
-            places[inner.points] += raised[:, None] * inner.there.normal
-        return np.union1d(behind, self._passed(starts, ends, old, new, free))
+        rise, reach, clear = np.zeros_like(starts), self._reach(old), self._heights(old, starts, none, none)[1]
+        for one in (near, last):
+            high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
+            rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
+        raised = self._passed(starts + rise, ends + rise, old, new, free & rise.any(axis=1))
+        return np.unique(np.concatenate([behind, self._passed(starts, ends, old, new, free), raised]))
 
     def _reach(self, nodes: Floats) -> Floats:
         """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are felt: their radius, half the thickness of the part."""
