@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fem_reference.effects import Effect
 from fem_reference.effects import contact as contacts
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
@@ -24,7 +26,7 @@ from fem_reference.problems import muscle
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decision, decisions, estimates
 from fem_reference.problems.guess import length_of, thickness_of
-from fem_reference.problems.joining import called, join
+from fem_reference.problems.joining import Span, called, join
 from fem_reference.problems.muscle import RELAXING, MuscleProblem
 from fem_reference.problems.problem import AtRest, Task
 from fem_reference.problems.setup import Bone, Setup
@@ -33,17 +35,6 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.muscles import MusclesCase
 
 _BETWEEN = 8  # samples of the motion of a bone between two stops
-
-
-@dataclass(frozen=True)
-class Span:
-    """The slices of joined arrays for one muscle: vertices of the surface, points of fibres, points of the mesh, and cells."""
-
-    name: str
-    vertices: slice
-    fibres: slice
-    points: slice
-    cells: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +84,22 @@ class MusclesProblem:
     def frames(self) -> tuple[int, ...]:
         """The requested frames."""
         return next(iter(self.problems.values())).frames
+
+    @property
+    def bones(self) -> tuple[Bone, ...]:
+        """The bones, which all muscles share."""
+        return next(iter(self.problems.values())).bones
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of all muscles, and the contact between them."""
+        found = tuple(effect for one in self.problems.values() for effect in one.effects)
+        return found if self.law is None else (*found, self.law)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the vertices of all surfaces that may be in contact with bones."""
+        return np.concatenate([one.free for one in self.problems.values()])
 
     @property
     def seconds(self) -> float:
