@@ -224,6 +224,10 @@ def test_a_point_that_goes_through_is_found_also_where_it_moves_along(element, e
 def test_a_point_between_a_curved_facet_and_its_flat_pieces_is_not_lost(element, end) -> None:
     # At x = 0.125 the facet is at 0.5 - 3/4 0.2 = 0.35, and flat pieces between its nodes at 0.4.
     assert lost(element, (0.125, end), (0.39, -0.7), 0.2).all()
+    assert lost(element, (0.125, end), (0.43, -0.7), 0.2).all()
+    assert not lost(
+        element, (0.125, 0.125), (0.43, 0.39), 0.2
+    ).any()  # from in front of the pieces, and still in front of it
 
 
 @pytest.mark.parametrize("element", KINDS)
