@@ -234,7 +234,7 @@ class Pass:
             high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
             rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
         paths = (starts, ends, free), (starts + rise, ends + rise, free & rise.any(axis=1))
-        points, facets = np.concatenate([self._passed(*path, old, new) for path in paths], axis=1)
+        points, facets = np.concatenate([self._passed(a, b, some, old, new) for a, b, some in paths], axis=1)
         there = self.other.nearest(new, facets, ends[points])
         front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= 0)
         return np.union1d(behind, points[~front])

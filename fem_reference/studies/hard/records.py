@@ -38,8 +38,9 @@ class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
-    block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of fibres
-    and of the measured lines. ``points_apart`` [mm]: the spacing of points on which bones press and springs pull, by default as on muscles.
+    block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
+    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points on which bones press and springs pull, by default
+    as on muscles.
     """
 
     size: Point
