@@ -104,11 +104,9 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
     hard, solver = posed.hard, choice.solver
     try:
         if hard.only and solver not in hard.only:
-            return Cell(
-                hard.name, solver, "not applicable", f"the case is about {', '.join(hard.only)} only: {hard.because}"
-            )
+            return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
-            return Cell(hard.name, solver, "not applicable", "nothing but effects acts, and this solver simulates none")
+            return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
         if takes is not None and posed.problem.muscle is not None:
             acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
