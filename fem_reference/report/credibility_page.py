@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.credibility import Beside, Credibility, Row, count, of_arms, reached
-from fem_reference.assessment.experiments import Experiment, experiments
+from fem_reference.assessment.experiments import experiments
 from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
@@ -33,7 +33,7 @@ def page(found: Credibility) -> Page:
         "met": {
             (fit.law, one.name): met(fit.values, one) for fit in found.fits for row in found.rows for one in row.beside
         },
-        "records": _records(found),
+        "records": dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {},
         "differences": {row.claim.name: differences(row, found.arms) for row in found.rows},
         "specimens": {row.claim.name: specimens(row) for row in found.rows},
         "source": source,
@@ -102,11 +102,6 @@ def source(experiment: str) -> str:
     'Van Loocke 2006'
     """
     return experiment.replace("_", " ").title()
-
-
-def _records(found: Credibility) -> dict[str, Experiment]:
-    """The records of all experiments, that of the scale last."""
-    return dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {}
 
 
 def facts(found: Credibility) -> dict[str, Any]:

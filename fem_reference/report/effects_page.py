@@ -104,7 +104,14 @@ def _most(found: CaseOmissions, one: Omission) -> str:
 
 def drawing(found: CaseOmissions) -> Drawing | None:
     """The change that an omission makes against the time that it saves; None where there is none to draw."""
-    points = {ablation.name: _points(ablation) for ablation in found.ablations}
+    points = {
+        ablation.name: [
+            (label(ablation, one), 100 * (1 - share), one.changes[MAIN])
+            for one in ablation.omissions
+            if MAIN in one.changes and not math.isnan(share := ablation.relative(one.seconds))
+        ]
+        for ablation in found.ablations
+    }
     changes = [change for rows in points.values() for _, _, change in rows]
     if not changes:
         return None
@@ -126,13 +133,6 @@ def drawing(found: CaseOmissions) -> Drawing | None:
         figure.legend(loc="outside lower center", ncols=4, fontsize="small")
 
     return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)
-
-
-def _points(ablation: Ablation) -> list[tuple[str, float, float]]:
-    """The omissions of a run that can be drawn: the name of each, the time saved [%] and the change of the surface [mm]."""
-    shares = ((one, ablation.relative(one.seconds)) for one in ablation.omissions if MAIN in one.changes)
-    known = [(one, share) for one, share in shares if not math.isnan(share)]
-    return [(label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in known]
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:

@@ -13,7 +13,7 @@ from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.report.tables import exerted, spread
 from fem_reference.runs.store import Run
-from fem_reference.scenes.case import Case, Expectation
+from fem_reference.scenes.case import Case
 
 # The statistics printed for a comparison; the page, JSON and CSV have all.
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
@@ -28,14 +28,12 @@ def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
         **of_case.facts(case, setup),
         "reference": " ".join([case.reference.solver, *(f"{k}={v}" for k, v in case.reference.settings.items())]),
         "candidates": {candidate.name: candidate.solver for candidate in case.candidate},
-        "expects": [f"{_what(e)}: {e.truth} within {e.within} ({e.kind})" for e in case.expect],
+        "expects": [
+            f"{one.of} {one.metric}{f' {one.statistic} at frame {one.frame}' if one.statistic is not None else ''}: "
+            f"{one.truth} within {one.within} ({one.kind})"
+            for one in case.expect
+        ],
     }
-
-
-def _what(expected: Expectation) -> str:
-    if expected.statistic is None:
-        return f"{expected.of} {expected.metric}"
-    return f"{expected.of} {expected.metric} {expected.statistic} at frame {expected.frame}"
 
 
 def comparison_text(result: Comparison) -> str:

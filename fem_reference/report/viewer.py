@@ -120,7 +120,9 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
         "both": _stops("coolwarm"),
         "warm": _stops("plasma"),
         "quantities": distance + fields.quantities(),
-        "force": _greatest_force(runs),
+        "force": max(
+            (float(np.linalg.norm(one[3:])) for row in runs for there in row["forces"] for one in there), default=0.0
+        ),
         "attached": np.unique(comparison.setup.attached_vertices).tolist(),
         "bars": fields.bars(),
         "fibres": fields.fibres(points),
@@ -131,12 +133,6 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
         **box.facts(),
         "runs": runs,
     }
-
-
-def _greatest_force(runs: list[dict[str, Any]]) -> float:
-    """The greatest magnitude [N] of the arrows of all ``runs``, 0 without any."""
-    forces = (one[3:] for row in runs for frame in row["forces"] for one in frame)
-    return max((float(np.linalg.norm(force)) for force in forces), default=0.0)
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:

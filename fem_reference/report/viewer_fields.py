@@ -56,7 +56,11 @@ class Fields:
         """The fibres that are drawn, and the indices of their points."""
         offsets = self.context.fibres.offsets
         chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
-        points = [_spread(offsets[i], offsets[i + 1]) for i in chosen]
+        spans = [(offsets[i], offsets[i + 1]) for i in chosen]
+        points = [
+            np.unique(np.linspace(first, end - 1, min(POINTS, end - first)).round().astype(np.int64))
+            for first, end in spans
+        ]
         ends = np.cumsum([0, *(len(own) for own in points)])
         indices = np.concatenate([np.zeros(0, np.int64), *points])
         return Polylines(self.context.fibres.points[indices], ends), indices

@@ -22,7 +22,7 @@ BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, an
 
 
 def sliding_by(path: float) -> Callable[[float], Floats]:
-    """The pose, 4 x 4, of what slides along z by a ``path`` [mm] from frame 0 to frame 1."""
+    """The pose, 4 x 4, of a body that slides along z by a ``path`` [mm] from frame 0 to frame 1."""
     return RigidMotion((0.0, 0.0, 1.0), None, (0.0, 1.0), (0.0, path)).pose
 
 
@@ -37,8 +37,8 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
 
 
 def in_series(bulk: float, stiffness: float, travel: float) -> float:
-    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] where a spring on it of a ``stiffness`` [MPa/mm], whose end is
-    moved down by a ``travel`` [mm], has the same: contact is that spring beyond its smoothing.
+    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
+    is moved down by a ``travel`` [mm]: contact is that spring beyond its smoothing.
     """
     force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
 
@@ -67,7 +67,7 @@ def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     }
 
 
-# Beside these the greatest pressure [MPa].
+# Also the greatest pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
     **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
@@ -92,7 +92,7 @@ def known_ball(name: str) -> float:
 
 
 CONTACT = partial(Entry, group="contact", relative=True, kind="closed form")
-# Of readings of a ball their ends of names, titles and units.
+# By reading of a ball: the end of the entry's name, the end of its title, and the unit.
 _SAID = {
     "force": ("force", "its force", "N"),
     "contact_radius": ("radius", "the radius of the contact", "mm"),
