@@ -13,7 +13,7 @@ from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
-from fem_reference.export.febio_regions import Part, parts
+from fem_reference.export.febio_regions import Piece, parts
 from fem_reference.problems.muscle import MuscleProblem
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
@@ -31,7 +31,7 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
         leaves(rigid, {"density": 1e-9, "center_of_mass": vector(middle if turned_about is None else turned_about)})
 
 
-def _muscle(materials: Element, number: int, part: Part) -> None:
+def _muscle(materials: Element, number: int, part: Piece) -> None:
     """One material where FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
     matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"

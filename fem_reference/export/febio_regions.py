@@ -37,7 +37,7 @@ _POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Piece:
     """Tetrahedra ``cells`` (k,) of one material, by its ``name``, and the ``effects`` in it, times their mean share there."""
 
     name: str
@@ -56,19 +56,19 @@ def shares(problem: MuscleProblem) -> dict[str, Floats]:
 
 
 @lru_cache(maxsize=8)
-def parts(problem: MuscleProblem) -> tuple[Part, ...]:
+def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
     """The parts of a muscle, the largest first; one where no effect has a region."""
     known = shares(problem)
     if not known:
-        return (Part(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
+        return (Piece(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
     levels = np.stack([_levels(one) for one in _parameters(problem, known)], axis=1)
     _, which, counts = np.unique(levels, axis=0, return_inverse=True, return_counts=True)
-    volumes, found = tet_volumes(problem.mesh.points, problem.mesh.tets), list[Part]()
+    volumes, found = tet_volumes(problem.mesh.points, problem.mesh.tets), list[Piece]()
     for number, kind in enumerate(np.argsort(-counts, kind="stable"), start=1):
         cells = np.flatnonzero(which == kind)
         means = {name: float(np.average(one[cells], weights=volumes[cells])) for name, one in known.items()}
         acting = (_scaled(effect, means.get(region_of(effect), 1.0)) for effect in problem.effects)
-        found.append(Part(f"{MUSCLE}_{number}", cells, tuple(one for one in acting if one is not None)))
+        found.append(Piece(f"{MUSCLE}_{number}", cells, tuple(one for one in acting if one is not None)))
     return tuple(found)
 
 
