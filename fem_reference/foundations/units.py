@@ -18,8 +18,8 @@ LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft"
 
 
 class Kind(NamedTuple):
-    """A kind of quantity: the ``unit`` that its numbers have inside, ``examples`` of one and of three in a file, the ``greatest``
-    magnitude, beyond all that exists and where digits are not lost, and the ways to write the unit of what has none.
+    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three in a file, the ``greatest`` magnitude accepted,
+    above any real one and without loss of digits; for a kind without a unit, the texts accepted in its place.
     """
 
     unit: str
@@ -28,7 +28,7 @@ class Kind(NamedTuple):
     written: tuple[str, ...] = ()
 
 
-# By what people call them. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
+# By name. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
 KINDS = {
     "a length": Kind("mm", ('"2 mm"', '"146, 238, -431 mm"'), 1e9),
     "an angle": Kind("rad", ('"30 deg"', '"0, 0, 30 deg"'), 1e6),
@@ -49,7 +49,7 @@ KINDS = {
     "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
     "a rate": Kind("1/s", ('"5 1/s"',)),
 }
-# Units that most scenes are made of, by unit and unit inside, as package pint has them, which takes 0.4 s to begin.
+# Common units, by unit and internal unit, with the factors of pint, whose import takes 0.4 s.
 COMMON = {
     ("cm", "mm"): 10.0,
     ("m", "mm"): 1000.0,
@@ -72,21 +72,21 @@ COMMON = {
     ("N mm", "N*mm"): 1.0,
     ("N m", "N*mm"): 1000.0,
 }
-# A number, then what may be a unit.
+# A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
-# What a unit may not have: an exponent that is no integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
+# Forbidden in a unit: an exponent that is no integer of one or two digits, or has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
-# The most characters of a quantity, and of three.
+# The most characters of a quantity.
 _LONGEST = 100
-# The least that a quantity above zero must be, in its unit inside.
+# The smallest accepted quantity above zero, in its internal unit.
 _SMALLEST = 1e-30
-# Where an exponent follows a unit without a sign for it, as in m3.
+# The place of an exponent that follows a unit without a sign, as in m3.
 _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 
 @cache
 def _registry() -> Any:
-    import pint  # a fifth of a second, for processes that read no other unit
+    import pint  # here, as it takes 0.4 s, which processes that read common units alone save
 
     return pint.UnitRegistry(cache_folder=None)
 
@@ -188,7 +188,7 @@ LengthUnit = Annotated[float, BeforeValidator(length_unit)]
 
 
 def unit_of(metadata: Sequence[object]) -> str:
-    """The unit inside of a field with the ``metadata`` of a type of this module; empty where it has none.
+    """The internal unit of a field with the ``metadata`` of a type of this module; empty where it has none.
 
     >>> unit_of(Density.__metadata__), unit_of(())
     ('tonne/mm^3', '')
@@ -198,7 +198,7 @@ def unit_of(metadata: Sequence[object]) -> str:
 
 
 def field_unit(field: Any) -> str:
-    """The unit inside of a ``field`` of a record, which stands with its type, or with one of several; empty where it has none."""
+    """The internal unit of a ``field`` of a record, by its type or one of its types; empty where it has none."""
     inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in kinds(field.annotation))
     return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
 
@@ -209,7 +209,7 @@ def kinds(annotation: Any) -> list[Any]:
 
 
 def written(value: Any, unit: str) -> Any:
-    """A number, or three, as text with the ``unit`` that it has inside; values without a unit, and texts, unchanged.
+    """A number, or three, as text with its internal ``unit``; values without a unit, and texts, unchanged.
 
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)
