@@ -97,7 +97,7 @@ def test_a_mistake_in_a_file_is_no_refusal_by_a_solver(old, new, message, tmp_pa
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('title = "a"\nhealthy = "b"\n[[bound]]\nquantity = "colour"\nat_most = 1', "as colour is not"),
+        ('title = "a"\nhealthy = "b"\n[[bound]]\nquantity = "colour"\nat_most = 1', "colour is none of them"),
         ('title = "a"\nhealthy = "b"', "bound: got nothing"),
         ("title = ", "a TOML file"),
     ],
