@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import RigidMotion
-from fem_reference.problems.fibre_ends import FibreEnds, attached_ends, completed, ends_of
+from fem_reference.problems.fibre_ends import FibreEnds, attached_ends, completed, ends_of, facts_of
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 
 BAR = shapes.skin(shapes.box((2, 2, 5), (10.0, 10.0, 50.0)))
@@ -114,6 +114,8 @@ def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
     assert not found.beside.any()
     assert (found.facts["fibre_ends_beside"], found.facts["fibre_ends_continued"]) == (0, 1)
     assert_allclose(found.beyond(ends_of(given), 0), [0, 5], rtol=1e-12)
+    # 50 mm without a tendon, and one of sqrt(9 x 9 + 47 x 47) mm with one of 5 mm.
+    assert_allclose(facts_of(given, found)["fibre_length_mean_mm"], (50 + np.sqrt(2290) + 5) / 2, rtol=1e-12)
     moved = ends_of(given) + [0, 0, 1]
     assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)
     assert found.facts["fibre_ends_continued_by"] == "last end of fibre 1, of top by its tendon: 5.0 mm"
@@ -148,7 +150,9 @@ def test_fibres_are_completed_to_the_closest_point_of_their_attachment() -> None
 
 
 def test_without_attachments_there_is_nothing_to_reach() -> None:
-    assert ends_of_setup(setup(), lines(([0, 0, 0], [0, 0, 9]))) is None
+    given = lines(([0, 0, 0], [0, 0, 9]))
+    assert ends_of_setup(setup(), given) is None
+    assert facts_of(given, None) == {"fibre_length_mean_mm": 9.0}
 
 
 def test_bones_take_their_ends_along() -> None:

@@ -119,7 +119,10 @@ class Pass:
         beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
         felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & (beyond <= _BEYOND))
         here = self._here(self.side.nodes(unknowns), some[felt])
-        faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
+        facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
+        # A point just beyond the edge of a wall that it sees from inside is outside: another facet is in front of it, out of reach.
+        edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING)
+        faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
         order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
         order = order[faces[order]]
