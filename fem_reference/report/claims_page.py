@@ -18,7 +18,7 @@ UNITS = {metric: one.unit for (metric, _), one in described("claim").items()}
 
 
 def page(claims: Claims) -> Page:
-    """The page of error bars beside errors."""
+    """The page of error bars and true differences."""
     whole = Cover.of(claims.claims)
     contents = {
         "claims": claims,
@@ -46,7 +46,7 @@ def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
 
 
 def facts(claims: Claims) -> dict[str, Any]:
-    """All of it as valid JSON: a number that is not finite is None."""
+    """The contents of the page as valid JSON: a number that is not finite is None."""
     whole = Cover.of(claims.claims)
     said = {"claims": whole.count, "covered": whole.share, "median_ratio": whole.median}
     return dict(plain(said | {"sizes_mm": claims.sizes, "missing": claims.missing, "rows": claims.claims}))

@@ -59,7 +59,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
 
 def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     """Readings of the force ``name`` on a quarter: that of the whole ball [N], and the radius [mm] of the contact from its lever,
-    as Hertz's pressures have their middle at 3/8 of it.
+    as the resultant of Hertz's pressure on a quarter has its lever at 3/8 of it.
     """
     return {
         "force": lambda state: 4 * float(state.forces[name][2]),
@@ -137,7 +137,7 @@ ENTRIES = (
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
-            because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",
+            because="the state is homogeneous and the plate a spring: only Newton's residual of 1e-12 N remains",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
@@ -147,7 +147,7 @@ ENTRIES = (
         "A rigid ball pressed into a large body: {}",
         ball,
         known_ball,
-        "the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
+        "the mesh leaves 1 to 1.5 %; strains of a tenth, the end of the body and the depth of the ball each add less",
         READINGS,
     ),
 )

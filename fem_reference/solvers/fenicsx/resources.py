@@ -43,7 +43,7 @@ def unknowns(cells: Cells, element: str) -> int:
 
 
 def state(cells: Cells, element: str, *, steps: bool) -> int:
-    """Bytes of the state of ``cells`` at a frame; ``steps``: with the start of the last load step."""
+    """The size [bytes] of the state of ``cells`` at a frame; with ``steps`` also of the start of its last load step."""
     kind, degree, pressure = ELEMENTS[element]
     nodes, corners = (len(reference_nodes(kind, order)) for order in (degree, 1))
     pressures = {None: 0, 0: 1, 1: corners}[pressure]
@@ -108,6 +108,6 @@ def _idle(cores: set[int]) -> float:
 
 
 def ranks(settings: BodySettings, count: int) -> int:
-    """The number of ranks for a solution of ``count`` unknowns: two where two are faster and a core is free for each."""
+    """The number of ranks for a solution of ``count`` unknowns: two where that is faster and a core is free for each."""
     worth = settings.linear_solver != "multigrid" and count >= _WORTH_RANKS
     return 2 if worth and idle_cores() >= 2 else 1
