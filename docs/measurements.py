@@ -27,7 +27,7 @@ _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 _FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
 _BESIDE = ("measurement", "model")
-_RESTS = "the measured number rests on"
+_RESTS = "source of the measured number"
 _ARMS = ("mean", "least", "greatest")
 # Frames of a hip that turns from rest to -0.3 rad and on to 0.3 rad, a hundredth of a radian a frame.
 _POSES = {30: "at -17 degrees", 60: "at rest", 90: "at 17 degrees"}
@@ -126,7 +126,7 @@ def _bodies_rows() -> str:
         measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
-    head = ("", "shipped material", "on cells twice as large, in half the steps", "measured", "", _RESTS)
+    head = ("", "shipped material", "with cells twice as large and half the steps", "measured", "", _RESTS)
     return table("bodies", head, rows)
 
 
@@ -211,8 +211,8 @@ def _credibility_grades() -> str:
         met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
         said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
-    experiment = ("measurements within their uncertainty", "the others: the model's value is", "specimens, by source")
-    head = ("quantity", "grade", "compared", *experiment, "other models as near as asked for", "model band")
+    experiment = ("measurements met within their uncertainty", "deviation of the others", "specimens, by source")
+    head = ("quantity", "grade", "compared", *experiment, "other models matched as required", "model band")
     return table("credibility", head, rows)
 
 
@@ -226,8 +226,8 @@ def _credibility_verified() -> str:
         rows.append((claim.name, verified, orders or "none", claim.other_codes, claim.bar))
     head = (
         "quantity",
-        "closed forms, and entries of the catalogue",
-        "orders that must be met",
+        "closed forms; entries of the catalogue",
+        "required orders of convergence",
         "other codes",
         "numerical bar",
     )
@@ -283,7 +283,7 @@ def _credibility_sources() -> str:
             met, n = f"{sum(one['met'] for one in own)} of {len(own)}", own[0]["n"] or "not known"
             rests = " / ".join(dict.fromkeys(one["rests_on"] for one in own))
             rows.append((credibility_page.source(name), record.specimen, n, met, rests))
-    return table("credibility", ("source", "specimens", "n", "within", "its numbers rest on"), rows)
+    return table("credibility", ("source", "specimens", "n", "met", "source of its numbers"), rows)
 
 
 def _credibility_arms() -> str:
@@ -307,9 +307,9 @@ def _credibility_arms() -> str:
                 *offsets,
             )
         )
-    shares = ("inside, or covered", "the same, 0 to 57 degrees", "asked for", "Modenese and Kohout's fibres")
-    poses = ("flexion, degrees", "poses", "bias", "scatter over the poses", "on larger tetrahedra")
-    return table("credibility", ("case", "beside", *shares, *poses), rows)
+    shares = ("inside, or covered", "from 0 to 57 degrees only", "required", "Modenese and Kohout's fibres")
+    poses = ("flexion, degrees", "poses", "bias", "scatter over the poses", "change on larger tetrahedra")
+    return table("credibility", ("case", "compared with", *shares, *poses), rows)
 
 
 def _arms_about(found: dict[str, Any]) -> Any:
@@ -430,7 +430,7 @@ def _omission_rows() -> str:
         ]
         time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
         rows.append((name, *changes, time, one["verdict"] or one["status"]))
-    return table("effects", ("left out", "surface, rms", "fibre length, rms", "volume", "time left", ""), rows)
+    return table("effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", ""), rows)
 
 
 def _study(found: dict[str, Any]) -> Any:
@@ -473,8 +473,11 @@ def _fibre_ends_rows() -> str:
         far = ("by a tendon: " if "fibre_ends_continued_by" in facts else "") + (", ".join(named) or "none")
         off = [one["status"] if value is None else f"{value:.1f}" for value in one["off"].values()] or [one["status"]]
         rows.append((f"`{one['case']}`", covered, f"{facts['fibre_ends']:.0f}", far, ", ".join(off)))
-    beside, off_bone = "more than 2 mm from their attachment", "worst end off its bone, 0.5, 1 rad, mm"
-    return table("fibre_ends", ("case", "covered by ends, %", "ends", beside, off_bone), rows)
+    beside, off_bone = (
+        "ends more than 2 mm from their attachment",
+        "greatest distance of an end from its bone, 0.5, 1 rad, mm",
+    )
+    return table("fibre_ends", ("case", "covered share of attachments, %", "ends", beside, off_bone), rows)
 
 
 def _fibre_choice(found: dict[str, Any]) -> Any:
@@ -552,11 +555,11 @@ def _fronts_rows() -> str:
         own = next((one for one in case.counted if one.solver == solver and one.is_default), None)
         if price is None:
             continue
-        half = "more time hardly helps"
+        half = "more time hardly reduces the error"
         if price.factor > 1:
             half = f"{'costs' if price.is_measured else 'would cost'} {number(price.factor, 2)} times the time"
         rows.append((f"`{solver}`", _error_and_time(own), _error_and_time(price.nearest), price.nearest.label, half))
-    head = ("solver", "settings of the case", "most accurate", "by", "half the error")
+    head = ("solver", "settings of the case", "most accurate", "setting", "half the error")
     return table("fronts", head, rows)
 
 
@@ -635,7 +638,7 @@ def _hard_programs_left_out() -> str:
         rows.append(
             (reason, len(cases), ", ".join(f"`{name}`" for name in names), ", ".join(f"`{name}`" for name in programs))
         )
-    return table("stress_programs", ("not applicable, because", "cases", "of", "to"), rows)
+    return table("stress_programs", ("reason", "cases", "folders", "programs"), rows)
 
 
 def _stress_steps() -> str:
@@ -644,7 +647,7 @@ def _stress_steps() -> str:
         off = (one["off"].get(count, "") for count in _STEPS)
         cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
         rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
-    return table("stress", ("case", "verdict", "to frame", *(f"in {count}" for count in _STEPS)), rows)
+    return table("stress", ("case", "verdict", "to frame", "1 step", "10 steps", "40 steps"), rows)
 
 
 def _solvers(found: dict[str, Any]) -> Any:
@@ -694,7 +697,7 @@ def _standings_rows(file: str) -> str:
         times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"] and not _failed(row)]
         time = f"{1e3 * median(times):.3g} ms" if times else "-"
         found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
-    return table(file, ("kind", "solver", *(f"`{case}`" for case in cases), "a frame, median"), sorted(found))
+    return table(file, ("kind", "solver", *(f"`{case}`" for case in cases), "time per frame, median"), sorted(found))
 
 
 def _standing(row: dict[str, Any] | None) -> str:
@@ -711,7 +714,7 @@ def _failed(row: dict[str, Any]) -> bool:
 def _learned_rows() -> str:
     """By solver its mean distance on poses and on shapes that were not learned from."""
     rows = kept("learned")["measured"]
-    counts = {row["split"]: f"{row['split']}s not seen, {row['muscles']} muscles" for row in rows}
+    counts = {row["split"]: f"{row['split']}s not seen in training, {row['muscles']} muscles" for row in rows}
     found = []
     for name in sorted(
         {row["solver"] for row in rows}, key=lambda name: [row["error"] for row in rows if row["solver"] == name]

@@ -29,6 +29,7 @@ from fem_reference.report.embedded import picture_source
 from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers.command import Description
 from fem_reference.solvers.recorded import About
@@ -46,7 +47,7 @@ def fill(text: str) -> str:
 
 def scene_records() -> list[type[Record]]:
     """The records of scene files: each case, and all that it is made of, once."""
-    return list(dict.fromkeys(inner for case in (MuscleCase, ScalarCase) for inner in _and_below(case)))
+    return list(dict.fromkeys(inner for case in (MuscleCase, MusclesCase, ScalarCase) for inner in _and_below(case)))
 
 
 def solver_records() -> dict[str, list[type[Record]]]:

@@ -4,10 +4,12 @@ passes without the fault.
 ``python tests/faults.py [NAME ...]`` (all without names) prints a line for each; exit status 1 where one is not noticed, or where a
 test that is red with a fault is red without it (``FAILS``). With ``--places`` it plants none and says in a second which of them
 have lost their place; with ``--list`` it plants none and names those that it would plant. ``faults.json`` keeps what came of each,
-when and at which commit; with ``--stale`` only those are planted whose row, file or tests are not what they were then.
+when and at which commit; with ``--stale`` only those are planted whose row, file or tests are not what they were then. Comments,
+docstrings and layout of Python files may change without that.
 """
 
 import argparse
+import ast
 import hashlib
 import json
 import os
@@ -64,9 +66,21 @@ def misplaced(fault: Fault) -> list[str]:
 
 
 def fingerprint(root: Path, fault: Fault) -> str:
-    """A hash of a fault and of the texts of its file and tests below ``root``, 16 hex digits."""
+    """A hash of a fault and of its file and tests below ``root``, 16 hex digits."""
     files = [place(root, fault), *(root / "tests" / f"{name}.py" for name in fault.tests.split())]
-    return hashlib.sha256(b"".join([repr(fault).encode(), *(one.read_bytes() for one in files)])).hexdigest()[:16]
+    return hashlib.sha256("\n".join([repr(fault), *map(statements, files)]).encode()).hexdigest()[:16]
+
+
+def statements(path: Path) -> str:
+    """The statements of a Python file, without comments, docstrings and layout; the text of any other file."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return text
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            del node.body[0]
+    return ast.unparse(tree)
 
 
 def key(fault: Fault) -> str:

@@ -147,7 +147,7 @@ def read_tables(folder: Path) -> None:
 
 def _meshes() -> dict[str, Kind]:
     made: dict[str, Callable[[Path], None]] = {
-        suffix: _make_surface(suffix) for suffix in files.surface_suffixes() if suffix != ".msh"
+        suffix: _make_surface(suffix) for suffix in formats() if suffix != ".msh"
     }
     made |= {"binary.ply": _make_surface(".ply", binary=True), "binary.stl": _make_surface(".stl", binary=True)}
     made |= {"meshio.vtu": _make_surface(".vtu", binary=True), "text.vtu": _make_surface(".vtu", binary=False)}

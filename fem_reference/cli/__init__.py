@@ -25,10 +25,10 @@ _CHECKOUT = Path(__file__).resolve().parents[2]  # or the folder that the packag
 
 def entry() -> None:
     """The installed command."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is running is cleaned up
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
     os.environ.setdefault(
         "OPENBLAS_NUM_THREADS", "1"
-    )  # read as numpy is loaded; on a busy machine more wait for each other
+    )  # read when numpy is loaded; on a busy machine more threads wait for each other
     sys.exit(main(sys.argv[1:]))
 
 
@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> int:
     try:
         words = [word for word in arguments if not word.startswith("-")]
         options = parser(words[0] if words else "").parse_args(arguments)
-        log = logging.getLogger("fem_reference")  # our own lines, and nobody else's
+        log = logging.getLogger("fem_reference")  # only our own messages
         log.setLevel(logging.WARNING if options.quiet else logging.INFO)
         log.handlers[:] = [logging.StreamHandler(sys.stderr)]
         _check_outputs(options)
@@ -54,23 +54,23 @@ def main(arguments: list[str]) -> int:
         return INTERRUPTED
     except SystemExit:
         raise
-    except BaseException as error:  # whatever it is, it is no verdict
+    except BaseException as error:  # no other error may end like a verdict
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
     return status
 
 
 def _explain(message: str, options: argparse.Namespace) -> None:
-    """Name the page of the documentation that explains a message, in a checkout, which has it."""
+    """Print the page of the documentation that explains a message, in a checkout, which contains it."""
     found = page_of(message)
     if found and not options.quiet and (_CHECKOUT / found.partition("#")[0]).exists():
         print(f"see {found}", file=sys.stderr)
 
 
 def _why_broken(error: BaseException) -> str:
-    """The sentence on an exception that nobody expected: what, where, and what to do."""
+    """The message for an unexpected exception: its text, its place, and what to do."""
     if isinstance(error, MemoryError):
-        return "there is not enough memory for this; nothing was judged. Smaller input, or larger tetrahedra, need less"
+        return "not enough memory; nothing was judged. Smaller input, or larger tetrahedra, need less"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
         return (
             f"the Python package {error.name} is not installed for {sys.executable}: pip install fem_reference there, which brings "
@@ -82,13 +82,13 @@ def _why_broken(error: BaseException) -> str:
     if os.environ.get(TRACEBACK_SETTING):
         traceback.print_exception(error)
     return (
-        f"a mistake of fem-reference itself, no verdict: {what} ({' < '.join(reversed(places))}). Please report it to whoever "
+        f"an error in fem-reference itself, not a verdict: {what} ({' < '.join(reversed(places))}). Please report it to whoever "
         f"gave you fem-reference, with the command line; {TRACEBACK_SETTING}=1 shows all of it"
     )
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """InputError where an output cannot be written, before anything is measured; makes nothing."""
+    """InputError where an output cannot be written, before anything is measured; creates nothing."""
     _check_folder("--out", out(options), written=options.writes)
     if getattr(options, "to", None) is not None:
         _check_folder("--to", options.to.absolute().parent, written=True)
@@ -102,8 +102,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError where ``--name`` cannot be the name of a page: the other files beside pages have names of their own."""
-    from fem_reference.report.asked import LONGEST  # what it needs may be missing, which is said below
+    """InputError where ``--name`` cannot be the name of a page: names of other files beside pages are reserved."""
+    from fem_reference.report.asked import LONGEST  # here, as packages that it needs may be missing
 
     taken = ("runs", "docs", "index")
     if name is not None and (name in taken or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)):

@@ -1,4 +1,4 @@
-"""A case on the command line: its choice and that of candidates, and pages, with the parts of a command that determine them."""
+"""Cases on the command line: the choice of a case and its candidates, their pages, and the words that name these pages."""
 
 import argparse
 from collections.abc import Iterable, Mapping
@@ -25,9 +25,7 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The case, with what ``--set`` changes of it and the effects that it needs; it expects of every candidate too that statistics
-    deviate no more than by ``--limit``, METRIC.STATISTIC=VALUE each.
-    """
+    """The case with the changes by ``--set``, the effects that it needs, and the expectations by ``--limit`` of every candidate."""
     if options.negative_control and options.set:
         raise InputError("--negative-control", "with --set", "one of the two")
     changes = dict(map(casefile.setting, options.set))
@@ -46,7 +44,7 @@ def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> Muscl
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
-    """The expectation by METRIC.STATISTIC=VALUE of every candidate; ``units`` of the statistics that there are."""
+    """The expectation of every candidate by METRIC.STATISTIC=VALUE; ``units`` of all statistics, by name."""
     name, _, within = (part.strip() for part in text.partition("="))
     metric, dot, statistic = name.partition(".")
     if not dot or not within:
@@ -89,7 +87,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
 
 
 def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = ()) -> tuple[Candidate, ...]:
-    """The solver of ``--solver-command`` as a candidate with a name that none of the ``others`` has; nothing without one."""
+    """The solver of ``--solver-command`` as a candidate, with a name unlike those of ``others``; none without the option."""
     if options.solver_command is None:
         return ()
     own = command.choice(options.solver_command, Path.cwd(), "--solver-command")
@@ -98,7 +96,7 @@ def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = 
 
 
 def command_parts(own: Iterable[Candidate]) -> list[Part]:
-    """The part of a page that a command of ``--solver-command`` makes different."""
+    """The part of a page's name for a command of ``--solver-command``."""
     return [Part(("--solver-command", one.settings["command"]), one.name) for one in own]
 
 
@@ -112,7 +110,7 @@ def check_names(names: list[str]) -> None:
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
-    """The bench of a case whose expectations, solvers and names are good; InputError, also for error bars of what has none."""
+    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars of a scalar case."""
     if options.error_bar:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
@@ -178,7 +176,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]], page: str) -> Asked:
-    """The ``page`` of a comparison: of the reference where there are candidates and none is chosen, beside that of all."""
+    """The ``page`` of a comparison; a page of the reference alone where the case has candidates and none is chosen."""
     alone = bool(case.candidate) and not chosen
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     return asked("run" if alone else "compare", case, options, page, *who)
@@ -212,8 +210,8 @@ def unturned(options: argparse.Namespace, word: str) -> list[str]:
     """A line for a negative control that did not turn the verdict to fail; empty otherwise."""
     if not options.negative_control or word == "fail":
         return []
-    why = "what it changes is not judged here (compare judges candidates too), or matters too little"
-    return [f"negative control: the verdict is {word} and was to be fail: {why}"]
+    why = "its change is not judged here (compare judges candidates too), or is too small"
+    return [f"negative control: the verdict is {word} and should be fail: {why}"]
 
 
 def status(results: Iterable[Comparison]) -> int:

@@ -1,8 +1,8 @@
-"""Pages of the documentation that explain messages: the few that a reader of such a message would want."""
+"""Pages of the documentation that explain messages."""
 
 import re
 
-# Patterns in a message, each with its page; the first that fits. Without one a message says all that there is.
+# Patterns of messages, each with its page; the first that fits counts.
 PAGES = (
     ("FEniCSx is not installed", "getting_started.md"),
     ("--solver-command", "your_own_solver.md#your-solver-as-a-command"),

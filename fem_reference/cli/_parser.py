@@ -114,10 +114,9 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 
 
 class _Given(argparse.Action):
-    """The value of an option, given once: a second one would silently replace it. A list has each of its values once."""
+    """The action of an option that may be given once, as a second value would replace the first; lists keep distinct values."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
-        """Take it."""
         del parser
         if option_string and isinstance(self.default, list):
             values = list(dict.fromkeys([*getattr(namespace, self.dest), values]))

@@ -15,7 +15,6 @@ HELP = "fit parameters of a case to measured forces, lengths or positions, with 
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set")
     data = "CSV file with the columns frame, quantity, value, unit, sd"
     parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=data)

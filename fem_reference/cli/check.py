@@ -21,7 +21,6 @@ HELP = "judge a candidate against its earlier results and against the reference,
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
@@ -41,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     scene = casefile.muscle(scene_of(options), "CASE")
     entry, place = choose(scene, options.candidate, options.unit)
     bench = checked_bench(scene, options, [(entry, place)])
-    # What is wrong with the baseline shows before anything is solved.
+    # Errors of the baseline are reported before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
     candidate = bench.obtain(entry.name, entry, place)  # first, as it may be bad input
     reference = bench.reference()

@@ -22,7 +22,6 @@ HELP = "measure candidates against the reference and write the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames; may be repeated"
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)

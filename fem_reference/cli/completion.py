@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def script(shell: str) -> str:
-    """The script for a ``shell``: names of cases and solvers where they may stand, files and folders where paths may."""
+    """The script for a ``shell``, which completes verbs, options, names of cases and solvers, files and folders."""
     whole = _parser.parser()
     (kinds,) = (one for one in whole._actions if isinstance(one, argparse._SubParsersAction))
     for action in (action for verb in kinds.choices.values() for action in verb._actions):

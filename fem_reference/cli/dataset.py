@@ -18,14 +18,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="a new folder, or one that a stopped build left")
     parser.add_argument("--muscles", type=positive, default=24, metavar="N", help="muscles drawn (default: 24)")
     parser.add_argument(
-        "--poses", type=positive, default=12, metavar="N", help="poses of each beside rest (default: 12)"
+        "--poses", type=positive, default=12, metavar="N", help="poses of each besides rest (default: 12)"
     )
-    parser.add_argument("--seed", type=positive, default=1, metavar="N", help="what they are drawn from (default: 1)")
+    parser.add_argument("--seed", type=positive, default=1, metavar="N", help="seed of the random numbers (default: 1)")
     share(parser, "--workers", "--scheduler")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Build it, and print what is in it and what was left out."""
+    """Build the data set, and print its contents and the muscles that were left out."""
     wanted = dataset.Sizes(options.muscles, options.poses, options.seed)
     workers = Workers(options.workers, options.scheduler)
     found = dataset.build(options.folder, wanted, out(options) / "runs", workers)

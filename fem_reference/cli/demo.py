@@ -1,4 +1,4 @@
-"""The verb ``demo``: the main job."""
+"""The verb ``demo``: the case hip_flexion with all its candidates."""
 
 import argparse
 
@@ -7,15 +7,14 @@ from fem_reference.cli._parser import share
 from fem_reference.scenes import casefile
 
 MAIN_JOB = "hip_flexion"
-HELP = "run the main job: compare the candidates of the case hip_flexion with its reference"
+HELP = "compare the candidates of the case hip_flexion with its reference"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "--ranks", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve the main job and all its candidates."""
+    """Solve the case and all its candidates."""
     scene = casefile.read(MAIN_JOB)
     return compared(scene, options, own_candidates(scene))

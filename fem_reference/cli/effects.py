@@ -15,14 +15,13 @@ HELP = "leave out each effect of a case in turn, measure the change and the time
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set", "--name", "--workers")
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case with each optional part left out, and write the page."""
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
-    scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
+    scene = scene.model_copy(update={"choice": "listed"})  # effects that "auto" would leave out are measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
     wanted = asked("effects", scene, options, "effects")
     publish(options, wanted, effects_page.page(found), facts(found), effects_page.text(found))

@@ -1,4 +1,4 @@
-"""The verb ``fetch-anatomy``: the anatomy that some cases need, out of what was downloaded."""
+"""The verb ``fetch-anatomy``: the anatomy that some cases need, from downloaded files."""
 
 import argparse
 import shlex
@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write what is known, and print what is missing, what can be solved and the licence."""
+    """Write the known files, and print the missing ones, the cases that can be solved and the licence."""
     wanted = fetching.known()
     found = fetching.fetch(options.sources, options.to, wanted)
     kept, made = (sorted({*files} - {*found}) for files in (wanted.published, wanted.made))
@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     cases, count = fetching.cases_with(found), len(wanted.published) + len(wanted.made)
     lines = [f"{options.to}: {len(found)} of {count} files found, by their content"]
     lines += [f"missing, of those that are published as they are: {', '.join(kept)}"] if kept else []
-    lines += [f"missing, cleaned, converted or computed, which copying cannot bring: {parts}"] if made else []
+    lines += [f"missing, cleaned, converted or computed, which copying cannot provide: {parts}"] if made else []
     lines += [f"cases that can be solved with it: {', '.join(cases) or 'none'}", f"licence: {wanted.licence}"]
     lines.append(f"export {DATA_SETTING}={shlex.quote(str(options.to.resolve()))}")
     facts = {"folder": str(options.to), "found": found, "missing": kept + made, "cases": cases}

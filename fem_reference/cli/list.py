@@ -17,7 +17,7 @@ REQUIRED = "required"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """It has no options of its own, and writes nothing into ``--out``."""
+    """No own options; the verb writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
 
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _data(case: Case) -> str | None:
-    """The reason why the data of a case is not here, "" where it is; None of a case that needs none."""
+    """The reason why the data of a case is missing, "" where it is present; None for a case without data."""
     root = os.environ.get(DATA_SETTING)
     if not case.needed_data:
         return None
@@ -58,7 +58,7 @@ def _settings(name: str) -> dict[str, Any]:
     for offer in solvers.offers(name):
         fields = offer.settings.model_fields
         found |= {key: REQUIRED for key, field in fields.items() if field.is_required()}
-        stated = {*offer.settings.model_fields}  # and no hash of what is not there
+        stated = {*offer.settings.model_fields}  # without hashes of files, which may not exist
         found |= offer.settings.model_construct().model_dump(mode="json", include=stated, warnings=False)
     return found
 

@@ -46,7 +46,6 @@ OCTAVE = ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figur
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     names = sorted(_PAGES)
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: only this case (default: all); may be repeated"
@@ -71,7 +70,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _examples(options: argparse.Namespace) -> int:
-    """Cases with all their candidates, one after the other."""
     cases = [casefile.read(name) for name in OCTAVE]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
@@ -89,7 +87,7 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+        Bench(scenes[name], out(options)).setup()  # the data of a case that is named must not be missing
     own = own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -130,7 +128,7 @@ def _estimation(options: argparse.Namespace) -> int:
 
 
 def _credibility(options: argparse.Namespace) -> int:
-    """The evidence for each quantity; moment arms where the anatomy is there."""
+    """The evidence for each quantity, with moment arms where the anatomy is installed."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
     entries = runner.entries().values()
@@ -166,7 +164,7 @@ def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iter
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
-    """Frames that somebody else's solvers made, by the name of the case."""
+    """Frames of other people's solvers, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")

@@ -18,14 +18,13 @@ from fem_reference.studies import cost
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 
-# The notations of frames a second, and of a time for each frame.
+# The notations of frames per second, and of a time per frame.
 _RATES = ("fps", "Hz", "frames/s", "1/s")
 _PER_FRAME = re.compile(r"\s*(?:/|per)\s*frame\s*$")
 HELP = "recommend a solver and setting for an error or a time, from the results of studies"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set")
     error = "the greatest error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)
@@ -64,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _number(given: str, text: str, unit: str, place: str) -> float:
-    """A quantity above zero; ``given``: all of what was written, for messages."""
+    """A quantity above zero, by its ``text`` in the ``given`` value, which messages name."""
     try:
         value = in_unit(text, unit)
     except ValueError as error:

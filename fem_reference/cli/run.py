@@ -18,7 +18,6 @@ HELP = "solve a case and judge its expectations of the reference"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "case", "--set")
     parser.add_argument("--solver", metavar="NAME", help="a solver other than the case's own reference")
     share(parser, "--error-bar", "--ranks", "--negative-control", "--name")

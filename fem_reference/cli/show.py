@@ -11,7 +11,6 @@ HELP = "show the parts of a case; with --out write its meshes for ParaView"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     share(parser, "case", "--set")
 
 

@@ -19,7 +19,6 @@ PAGE = "standings"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     parser.add_argument(
         "cases",
         metavar="CASE",

@@ -19,14 +19,13 @@ HELP = "run the hard cases with every solver, and write a page that shows which 
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
-    program = "a program in a folder, as in standings; these alone, where --solver names no others; may be repeated"
+    program = "a program in a folder, as in standings; only these run, where --solver names no others; may be repeated"
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
-    many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps: one end"
+    many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps, which must agree"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on N randomly perturbed meshes of each case as well"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
@@ -34,12 +33,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run them all and write the page; a run that fails is a result, not a failure of the verb."""
+    """Run the hard cases and write the page; a run that fails is a result, not a failure of the verb."""
     if options.jitters < 0:
         raise InputError("--jitters", options.jitters, "0 or more")
     for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
         if wanted and options.solver and records.REFERENCE not in options.solver:
-            want = f"--solver {records.REFERENCE} too, which alone it is about"
+            want = f"--solver {records.REFERENCE} too, the only solver that it changes"
             raise InputError(name, f"it with {', '.join(options.solver)} alone", want)
     hard = records.read_all(tuple(options.names))
     commanded, programs = own_solver(options, list(records.choices())), [*map(standings.program, options.program)]

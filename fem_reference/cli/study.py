@@ -20,7 +20,6 @@ HELP = "measure error against time: reference and candidates over ladders of set
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     parser.add_argument("cases", metavar="CASE", nargs="+", help=CASE)
     change = "change a key of every case, such as muscle.tet_size='8 mm'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)

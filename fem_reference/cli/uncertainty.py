@@ -16,7 +16,6 @@ RUNS = 64
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has."""
     share(parser, "case", "--set")
     many = f"number of runs of the reference, at the case's size for quick solutions (default: {RUNS})"
     parser.add_argument("--runs", type=positive, default=RUNS, metavar="N", help=many)

@@ -18,7 +18,6 @@ HELP = "measure problems with known answers, and write the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
     known = "an entry, a group or a shell pattern of them (default: all)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
     control = "measure this entry with its deliberate mistake, with which it must fail; may be repeated"

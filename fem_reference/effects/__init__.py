@@ -3,7 +3,7 @@
 Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, and one expression written once,
 with operators and the functions of ``Functions`` only, so that a solver can use it symbolically and a test can evaluate it
 in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
-traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A
+traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
 ``FieldEffect`` acts on a scalar field psi and has a weak form.
 
 A solver may replace an effect's parameters by symbols, so that a compiled form serves every value of them: an expression
@@ -11,7 +11,6 @@ never branches on a parameter and uses it with operators and ``state.functions``
 """
 
 import importlib
-import pkgutil
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -19,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, field_validator
 
-from fem_reference.foundations import outside
+from fem_reference.foundations import modules, outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit, Range
@@ -52,11 +51,11 @@ class Effect(Record):
     published: ClassVar[dict[str, Range]] = {}
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
-        """The amount of it that acts at a frame: 1, unless it has a ramp."""
+        """The amount of the effect at a frame: 1, unless it has a ramp."""
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
-        """The ranges of its validity; none unless its docstring gives one."""
+        """The ranges of its validity; none unless its docstring states one."""
         return ()
 
     def moduli(self) -> Moduli:
@@ -77,8 +76,11 @@ class Effect(Record):
 
     @property
     def title(self) -> str:
-        """Its name among the effects of a scene."""
-        return type(self).__name__
+        """Its name, with its part of the surface and its region, by which it is distinct from others of its kind in a scene."""
+        on = getattr(self, "on", "")
+        return (
+            type(self).__name__ + (f" on {on}" if on else "") + (f" in {region}" if (region := region_of(self)) else "")
+        )
 
     @property
     def parameters(self) -> list[tuple[str, Any, str]]:
@@ -100,7 +102,6 @@ class Ramped(Effect):
         return ramp
 
     def amount(self, frame: float) -> float:
-        """The amount of it that acts at a frame."""
         frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.ramp), strict=True)
         return float(np.interp(frame, frames, amounts))
 
@@ -119,11 +120,6 @@ class Energy(Effect):
         if "momentum" in cls.needs:
             raise ValueError("no region: the whole body moves")
         return region
-
-    @property
-    def title(self) -> str:
-        """Its name among the effects of a scene, which may include others of its kind in other regions."""
-        return type(self).__name__ + (f" in {self.region}" if self.region else "")
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa] at ``state``, of a point that is fully in its region."""
@@ -152,11 +148,9 @@ class VolumeLaw(Energy):
     bulk: PositivePressure
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(bulk=self.bulk)
 
 
@@ -180,11 +174,6 @@ class Load(Effect):
     example: ClassVar[dict[str, Any]] = {"on": "top"}
     on: str
 
-    @property
-    def title(self) -> str:
-        """Its name among the effects of a scene, which may include other loads of its kind."""
-        return f"{type(self).__name__} on {self.on}"
-
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""
         raise NotImplementedError(f"{type(self).__name__} has no traction")
@@ -202,12 +191,12 @@ class Prestrain(Effect):
     """An effect that changes the elastic part of the deformation."""
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
-        """The deformation gradient (3, 3) that the energies see."""
+        """The elastic deformation gradient (3, 3), on which the energies depend."""
         raise NotImplementedError(f"{type(self).__name__} has no elastic deformation")
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """``state`` with the F that the energies of ``acting`` see: the elastic one with a prestrain."""
+    """``state`` with the F of the energies of ``acting``: with a prestrain, its elastic part."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
@@ -246,12 +235,12 @@ class FieldEffect(Record):
 
 def names(kind: type[Record] = Effect) -> list[str]:
     """The existing effects of a ``kind``, by their names in scene files."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__) if issubclass(_record(module.name), kind))
+    return [name for name in modules.names(__path__) if issubclass(_record(name), kind)]
 
 
 def find(name: str) -> type[Record]:
     """The record of the effect ``name``; KeyError where there is none."""
-    if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
+    if name not in modules.names(__path__):
         raise KeyError(name)
     return _record(name)
 

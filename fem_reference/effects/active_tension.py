@@ -9,7 +9,7 @@ from fem_reference.foundations.units import PositivePressure
 
 class ActiveTension(Ramped, Energy):
     """``amount T/2 (J^(-2/3) fibre . C fibre - 1)``: at constant volume a second Piola-Kirchhoff stress of ``amount T`` along the
-    fibre and a pressure, which the resistance to volume change takes.
+    fibre and a pressure, which the resistance to volume change balances.
 
     ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641, of incompressible material.
     """
@@ -24,5 +24,4 @@ class ActiveTension(Ramped, Energy):
         return fibre_indicator(scene, pull, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return state.amount * self.tension / 2 * (state.J ** (-2 / 3) * state.square_stretch(state.fibre) - 1)

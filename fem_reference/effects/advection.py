@@ -15,7 +15,6 @@ class Advection(FieldEffect):
     velocity: tuple[float, ...]
 
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
-        """``v . grad psi``."""
         return self.along(psi)
 
     def along(self, function: FieldState) -> Any:

@@ -1,4 +1,4 @@
-"""Collagen across the fibres: a sheet of directions in the plane across them, each of which pulls where it is stretched."""
+"""Collagen across the fibres, in all directions of the plane perpendicular to them, under tension only where it is stretched."""
 
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ from fem_reference.foundations.units import PositivePressure
 # The cosines of twice the angle, evenly over half a turn; as Python floats: numpy numbers would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
-# A root of zero has no slope: the squared spread is that much greater, of the squared mean.
+# The square root has no slope at 0: this share of the squared mean is added to the squared spread.
 _ROUNDING = 1e-13
 
 
@@ -23,8 +23,8 @@ class CollagenAcross(Energy):
     half the trace of C there and ``mean^2 - spread^2`` its determinant; eight angles are summed.
 
     Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019,
-    doi 10.1016/j.jmbbm.2019.05.012, do for muscle, which then is stiffer in tension across its fibres than along them; here
-    without directions out of the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
+    doi 10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here only
+    over directions in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -37,7 +37,6 @@ class CollagenAcross(Energy):
         return Moduli(shear=self.k1 / 4)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         factor, functions = state.J ** (-2 / 3), state.functions
         mean = factor * (state.I1 - state.square_stretch(state.fibre)) / 2
         area = sum(sum(entry * a for entry, a in zip(row, state.fibre, strict=True)) ** 2 for row in state.cofactors)

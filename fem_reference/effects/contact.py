@@ -12,11 +12,11 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class Contact(Interaction):
-    """A pressure of the gap g to each bone, its signed distance, negative inside: 0 beyond the ``smoothing`` d,
+    """A pressure by the gap g to each bone, which is the signed distance, negative inside: 0 beyond the ``smoothing`` d,
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper, k the ``stiffness`` (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
-    distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], beside ``in_situ`` only: the
+    distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], with ``in_situ`` only: the
     distance within which a bone may press at rest, through tissue between them that is not meshed, such as a capsule or a bursa;
     by default only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it
     contact is frictionless.

@@ -12,9 +12,9 @@ from fem_reference.foundations.units import PositivePressure
 PEAK_STRESS = Range(
     low="225 kPa",
     high="350 kPa",
-    source="specific tension: 22.5 N/cm2 in small mammals, 26.8 weighed from 96 human values (Persad et al. 2024, "
+    source="specific tension: 22.5 N/cm2 in small mammals, 26.8 as the weighted mean of 96 human values (Persad et al. 2024, "
     "doi 10.1152/japplphysiol.00296.2024, abstract); 30 (SD 5) N/cm2 in the quadriceps of 27 men (In vivo specific tension of "
-    "the human quadriceps femoris muscle, Eur J Appl Physiol 2009, abstract); 0.35 MPa is also Zajac's (1989), from memory",
+    "the human quadriceps femoris muscle, Eur J Appl Physiol 2009, abstract); Zajac's value (1989) is also 0.35 MPa, from memory",
 )
 
 
@@ -35,7 +35,6 @@ class FibreActive(Ramped, Energy):
     optimal_stretch: float = Field(gt=0)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the fibre stretch."""
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:

@@ -11,8 +11,8 @@ from fem_reference.foundations.units import PositivePressure
 
 # In this form Thelen's exp(k (l - 1)/e) - 1 over exp(k) - 1 has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6.
 _SOURCE = (
-    "Blemker, Pinsky and Delp 2005 (doi 10.1016/j.jbiomech.2004.04.009: 0.05 and 6.6, as FEBio's manual has them) to Thelen 2003 "
-    "(doi 10.1115/1.1531112: exponent 5 and strain 0.6 at the peak active stress, as OpenSim has them, so 0.00678 and 8.33); "
+    "Blemker, Pinsky and Delp 2005 (doi 10.1016/j.jbiomech.2004.04.009: 0.05 and 6.6, as in FEBio's manual) to Thelen 2003 "
+    "(doi 10.1115/1.1531112: exponent 5 and strain 0.6 at the peak active stress, as in OpenSim, so 0.00678 and 8.33); "
     "neither paper was read"
 )
 
@@ -48,11 +48,9 @@ class FibrePassive(PassiveFibres):
     linear_from: float = Field(gt=1)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the fibre stretch."""
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(fibres=self.stress)
 
     def energy(self, state: State) -> Any:

@@ -29,7 +29,6 @@ class Gravity(Ramped, Energy):
         return Indicator(rule, stress / scene.shear, scene.bend(force), stress)
 
     def resultant(self, shape: Shape) -> Wrench:
-        """The weight."""
         return dead(self.density * np.array(self.acceleration), shape)
 
     def energy(self, state: State) -> Any:

@@ -13,8 +13,8 @@ class Guccione(Energy):
     ``E = (J^(-2/3) C - 1) / 2`` in axes along the fibre (f) and any two across it (s, n).
 
     ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
-    Land et al. 2015, doi 10.1098/rspa.2015.0641, both of incompressible material. Without the factor the pressure unknown has to
-    balance the whole of a large tension, and mixed elements of two layers lose their balance in the ventricle of Land et al.
+    Land et al. 2015, doi 10.1098/rspa.2015.0641, both of incompressible material. Without the factor ``J^(-2/3)`` the pressure
+    unknown has to balance all of a large tension, and mixed elements in two layers lose equilibrium in the ventricle of Land et al.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -25,7 +25,6 @@ class Guccione(Energy):
     bfs: float = Field(gt=0)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.c * self.bt / 2)
 
     def energy(self, state: State) -> Any:

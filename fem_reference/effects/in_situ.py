@@ -9,14 +9,14 @@ from fem_reference.effects import Effect, Prestrain, State, moduli
 
 
 class InSitu(Prestrain):
-    """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f; and what acts at
-    the first frame, an activation too, is in equilibrium at ``F = 1``, by a stress at rest that balances it.
+    """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f. A stress at
+    rest balances all effects at the first frame, an activation included, so that ``F = 1`` is in equilibrium there.
 
     Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
-    turns with the body. They are strain and pressure of an isotropic body under the forces that act at rest, of the shear and
-    bulk modulus at rest of the scene's effects: of all stresses that balance these forces, the one of least energy. Springs of
-    attachments are extended at rest, and bones press there, like supports of that body: a bone wherever the muscle
-    touches it or is within ``support`` of it (``contact``), through the tissue between.
+    turns with the body. They are the strain and pressure of an isotropic body under the forces at rest, with the shear and bulk
+    modulus at rest of the scene's effects: of all stresses that balance these forces, this one has the least energy. That body is
+    supported by the springs of attachments, which are extended at rest, and by the bones, which press wherever the muscle touches
+    them or is within ``support`` of them (``contact``), through the tissue between.
 
     ``stretch``: without unit, above 1 where fibres are taut at rest; 1 where only an activation acts there.
     Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find by iteration a prestrain with this
@@ -28,7 +28,6 @@ class InSitu(Prestrain):
     stretch: float = Field(gt=0)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
-        """The deformation gradient (3, 3) that the energies see."""
         return state.stretched(self.stretch)
 
 
@@ -38,9 +37,7 @@ def among(acting: Iterable[object]) -> InSitu | None:
 
 
 def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
-    """The shear and bulk modulus [MPa] of the isotropic body: those at rest of ``effects``; where these have no bulk modulus, ten
-    times the shear modulus.
-    """
+    """The shear and bulk modulus [MPa] at rest of ``effects``; without a bulk modulus, ten times the shear modulus."""
     found = moduli(effects)
     return found.shear, found.bulk or 10 * found.shear
 

@@ -19,5 +19,4 @@ class Incompressible(VolumeLaw):
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return state.pressure * (state.J - 1) - state.pressure**2 / (2 * self.bulk)

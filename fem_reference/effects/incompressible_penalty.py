@@ -12,5 +12,4 @@ class IncompressiblePenalty(VolumeLaw):
     """
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return self.bulk / 2 * (state.J - 1) ** 2

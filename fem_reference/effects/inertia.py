@@ -15,10 +15,10 @@ class Inertia(Energy):
 
     Of the generalised-alpha family that is the method in which stresses are those at the end of a step (Wood, Bossak and
     Zienkiewicz 1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
-    ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``, of which r, ``spectral_radius``, is what a
-    step leaves of the shortest waves: 1 keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy.
-    A step then ends where ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies are least: a potential of the step,
-    which no material stores.
+    ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``. A step scales the shortest waves by r, the
+    ``spectral_radius``: 1 keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. At the end of a
+    step the sum of ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies is least: a potential of the step, not a
+    stored energy.
 
     ``density``: at rest [tonne/mm^3]; ``spectral_radius``: from 0 to 1.
     """
@@ -52,9 +52,7 @@ class Inertia(Energy):
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement [mm] after a step of ``seconds`` without forces, from ``u`` with velocity ``v`` and acceleration ``a``
-        (arrays of one shape).
-        """
+        """The displacement [mm] after ``seconds`` without forces, from ``u``, velocity ``v`` and acceleration ``a`` there."""
         alpha, _, beta = self._rule()
         return u + seconds * v + seconds**2 * (0.5 - beta - beta * alpha / (1 - alpha)) * a
 

@@ -28,11 +28,6 @@ class Membrane(Load):
     mu: PositivePressure
     region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
 
-    @property
-    def title(self) -> str:
-        """Its name among the effects of a scene."""
-        return super().title + (f" in {self.region}" if self.region else "")
-
     def potential(self, state: State, normal: Sequence[Any]) -> Any:
         """Energy per rest area [N/mm], by the share of the point in its region."""
         area = sum(sum(c * n for c, n in zip(row, normal, strict=True)) ** 2 for row in state.cofactors)

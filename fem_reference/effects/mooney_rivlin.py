@@ -25,10 +25,8 @@ class MooneyRivlin(Energy):
         return self
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=2 * (self.c1 + self.c2))
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         J = state.J
         return self.c1 * (J ** (-2 / 3) * state.I1 - 3) + self.c2 * (J ** (-4 / 3) * state.I2 - 3)

@@ -27,9 +27,7 @@ class NeoHooke(Energy):
     mu: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.mu)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return self.mu / 2 * (state.J ** (-2 / 3) * state.I1 - 3)

@@ -10,13 +10,13 @@ from fem_reference.foundations.loads import Shape, Wrench
 
 
 class Pressure(Ramped, Load):
-    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
+    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the present surface, by Nanson's formula.
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
 
-    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. What
-    is attached exactly keeps its size, and the body around it is sheared: a cube of side L with one clamped triangle, whose legs
-    are a, keeps 0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
+    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. A
+    clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle of legs a, V/V0 is
+    greater by 0.15 mu / K (a / L)^3 p / K, for example 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
@@ -29,11 +29,10 @@ class Pressure(Ramped, Load):
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The load on the whole part as it is now."""
+        """The load on the whole present part."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
-        """Force per rest area [MPa], (3,)."""
         load = -state.amount * self.pressure
         return [load * sum(c * n for c, n in zip(row, normal, strict=True)) for row in state.cofactors]

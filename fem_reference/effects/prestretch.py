@@ -10,8 +10,8 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 
 
 class Prestretch(Ramped, Prestrain):
-    """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: stretched by ``l = 1 + amount (stretch - 1)`` along the
-    fibre f, at the same volume.
+    """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)`` along
+    the fibre f, at the same volume.
 
     ``stretch``: without unit, above 1 where fibres are taut at rest.
     """
@@ -32,5 +32,4 @@ class Prestretch(Ramped, Prestrain):
         return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
-        """The deformation gradient (3, 3) that the energies see."""
         return state.stretched(1 + state.amount * (self.stretch - 1))

@@ -15,5 +15,4 @@ class Reaction(FieldEffect):
     rate: float
 
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
-        """``c psi``."""
         return self.rate * psi.value

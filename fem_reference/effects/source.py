@@ -18,6 +18,5 @@ class Source(FieldEffect):
     where: Literal["everywhere", "y above average"]
 
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
-        """``-f``."""
         strength = evaluate(self.strength, place.position, place.functions)
         return -strength * place.upper if self.where == "y above average" else -strength

@@ -1,4 +1,4 @@
-"""Isotropic elastic law of two squared constraints, as Newton's XPBD has it: without resistance to a change of shape at rest."""
+"""Isotropic elastic law of two squared constraints, as in the XPBD of Newton: without resistance to a change of shape at rest."""
 
 from typing import Any, ClassVar
 
@@ -9,7 +9,7 @@ from fem_reference.foundations.units import PositivePressure
 class SquaredInvariants(Energy):
     """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``.
 
-    ``mu``, ``lame``: stiffness of the two terms [MPa]. At rest they are no Lame's parameters: the shear modulus is 0 and the bulk
+    ``mu``, ``lame``: stiffness of the two terms [MPa]. They are not Lame's parameters: at rest the shear modulus is 0 and the bulk
     modulus ``lame + 4 mu``. Source: Newton 1.8.0, newton/_src/solvers/xpbd/kernels.py, ``solve_tetrahedra``, whose compliances are
     one over stiffness and rest volume.
     """
@@ -23,5 +23,4 @@ class SquaredInvariants(Energy):
         return Moduli(bulk=self.lame + 4 * self.mu)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return self.mu / 2 * (state.I1 - 3) ** 2 + self.lame / 2 * (state.J - 1) ** 2

@@ -1,4 +1,4 @@
-"""Isotropic elastic law that is linear in Green's strain, as MuJoCo and position based libraries have it."""
+"""Isotropic elastic law that is linear in Green's strain, as in MuJoCo and position based libraries."""
 
 from typing import Any, ClassVar
 
@@ -10,8 +10,8 @@ from fem_reference.foundations.units import PositivePressure
 class StVenantKirchhoff(Energy):
     """``mu tr(E^2) + lame/2 (tr E)^2`` with ``E = (C - 1) / 2`` (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.151).
 
-    ``mu``, ``lame``: Lame's parameters [MPa]. Valid for V/V0 from 1/2 to 2: the law yields under compression, and resists being
-    turned inside out no more than being pressed flat.
+    ``mu``, ``lame``: Lame's parameters [MPa]. Valid for V/V0 from 1/2 to 2: the law softens under compression, and a body that is
+    pressed flat turns inside out without further resistance.
     """
 
     example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}
@@ -19,15 +19,12 @@ class StVenantKirchhoff(Energy):
     lame: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
         return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
 
     def limits(self) -> tuple[Limit, ...]:
-        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         C = state.C
         square = sum((C[i][k] - (i == k)) ** 2 for i in range(3) for k in range(3)) / 4
         return self.mu * square + self.lame / 8 * (state.I1 - 3) ** 2

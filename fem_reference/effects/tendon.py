@@ -1,4 +1,4 @@
-"""Straight tendons that pull the muscle to bone beyond it, as the iliotibial tract does."""
+"""Straight tendons from the muscle to a bone beyond it, such as the iliotibial tract."""
 
 from typing import Any, ClassVar
 
@@ -7,11 +7,11 @@ from fem_reference.foundations.units import PositiveLength, Stiffness
 
 
 class Tendon(Interaction):
-    """Tension ``k (l - l0)`` along straight lines that are longer than at rest, from the surface within ``reach`` of the ends of
-    those fibres that continue as the ``tendon`` of an attachment, to that point of its bone; slack lines do not push.
+    """Tension ``k (l - l0)`` along straight lines that are longer than at rest. They run from the surface within ``reach`` of the
+    ends of fibres that continue as the ``tendon`` of an attachment, to that point of its bone; slack lines do not push.
 
     ``on``: that attachment; ``stiffness`` [N/mm]: of all lines together, k by share of the area, ``E A / l0`` of a tendon of the
-    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and is refused beside ``in_situ``.
+    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with ``in_situ``.
     Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 
@@ -19,8 +19,3 @@ class Tendon(Interaction):
     on: str
     stiffness: Stiffness
     reach: PositiveLength
-
-    @property
-    def title(self) -> str:
-        """Its name among the effects of a scene, which may include tendons of other attachments."""
-        return f"{type(self).__name__} on {self.on}"

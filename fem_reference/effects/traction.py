@@ -30,5 +30,4 @@ class Traction(Ramped, Load):
         return dead(self.force, shape, self.on)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
-        """Force per rest area [MPa], (3,)."""
         return [state.amount * entry for entry in self.force]

@@ -11,12 +11,11 @@ from fem_reference.foundations.units import Viscosity as Coefficient
 
 
 class Viscosity(Energy):
-    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its share of volume, of which incompressible material has
-    none.
+    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, which is 0 in incompressible material.
 
     Over a load step D is ``rate e`` (implicit Euler), ``e = (f^T f - 1)/2`` the Green strain of ``f = F F_before^-1``, and the
-    stress the slope of ``eta rate |e|^2`` per volume before the step: a potential of the step, which no material stores and turning
-    does not change. It is that law to first order in the step.
+    stress the slope of ``eta rate |e|^2`` per volume before the step: a potential of the step, not a stored energy, which rotations
+    do not change. It agrees with that law to first order in the step.
 
     ``eta``: [MPa s].
     """

@@ -1,4 +1,4 @@
-"""Export of a problem: open formats, and FEBio's own; of runs, for ParaView. Frames come back by ``solvers.recorded``."""
+"""Export of problems in open formats and for FEBio, and of runs for ParaView; ``solvers.recorded`` reads results back."""
 
 import logging
 from collections.abc import Callable
@@ -35,14 +35,14 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
     """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. Of several muscles each has a folder
-    with its name, and FEBio one file of all. InputError where the folder is not free, or FEBio has not the same.
+    with its name, and FEBio one file of all. InputError where the folder is not free, or FEBio lacks an effect of the case.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     for one in _parts(case) if form == "febio" else ():
         febio.check(one)
-    with new_folder(folder) as part:  # whether it can be written shows before a problem is built
+    with new_folder(folder) as part:  # made first: that it cannot be written shows before a problem is built
         problem = build()
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
@@ -56,12 +56,10 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
 
 
 def _parts(case: Case) -> tuple[MuscleCase, ...]:
-    """The muscles of a case."""
     return tuple(casefile.muscle(one) for one in case.parts or (case,))
 
 
 def _muscle(problem: CaseProblem) -> MuscleProblem:
-    """The problem of a muscle; InputError where there is none."""
     if problem.muscle is None:
         raise InputError("export", "a scalar field", "a muscle")
     return problem.muscle
@@ -74,7 +72,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
-    """A folder for each muscle, and what is of all."""
+    """Write a folder for each muscle, and a text for all."""
     for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")

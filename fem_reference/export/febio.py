@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from fem_reference.effects import name_of, region_of
+from fem_reference.effects import name_of
 from fem_reference.effects.contact import Contact
 from fem_reference.effects.fibre_passive import FibrePassive
 from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
@@ -24,6 +24,7 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export import febio_mesh
 from fem_reference.export.febio_contact import add_contact, has_contact, notes
 from fem_reference.export.febio_material import add_fibres, add_materials
+from fem_reference.export.febio_regions import parts
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import join
 from fem_reference.io import files
@@ -44,9 +45,12 @@ def check(case: MuscleCase) -> None:
         if not isinstance(effect, SAME):
             want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
             raise InputError(join(case.place, f"effect[{i}]"), f'"{name_of(effect)}"', want)
-        if region := region_of(effect):
-            want = "a law of the whole muscle: regions with a smooth border are not exported to FEBio"
-            raise InputError(join(case.place, f"effect[{i}].in"), f'"{region}"', want)
+    if len({(one.c4, one.linear_from) for one in case.effects if isinstance(one, FibrePassiveFebio)}) > 1:
+        got, want = (
+            "fibre_passive_febio of different c4 or linear_from",
+            "the same in all regions, as FEBio has one law",
+        )
+        raise InputError(join(case.place, "effect"), got, want)
     matrix = (NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"
     volume = (Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"
     for kinds, got in (matrix, volume):
@@ -131,7 +135,8 @@ def _domains(root: Element, problem: MuscleProblem) -> None:
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
-    SubElement(domains, "SolidDomain", name="muscle", mat="muscle", type=kind)
+    for part in parts(problem):
+        SubElement(domains, "SolidDomain", name=part.name, mat=part.name, type=kind)
     shells = {febio_mesh.bone_id(bone): bone for bone in problem.bones}
     shells |= {febio_mesh.springs_id(attached): attached.bone for attached in febio_mesh.by_springs(problem)}
     for name, bone in shells.items():

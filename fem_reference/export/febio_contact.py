@@ -12,8 +12,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.linalg import eigh
 
-from fem_reference.export import febio_mesh
+from fem_reference.export import febio_mesh, febio_regions
 from fem_reference.export.febio_material import matrix_constants
+from fem_reference.export.febio_regions import parts
 from fem_reference.foundations.mesh import Floats, corner_areas
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import MuscleProblem
@@ -84,16 +85,17 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
     would press at once with more than the matrix bears.
     """
     assert problem.contact is not None  # or there is no contact
-    matrix = matrix_constants(problem.effects)
-    bears = _AT_ONCE * 2 * (matrix["c1"] + matrix["c2"]) / problem.contact.stiffness
+    softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
+    bears = _AT_ONCE * 2 * softest / problem.contact.stiffness
     return min(SEARCH_RADIUS, bears) if deep > bears else SEARCH_RADIUS
 
 
 def notes(problem: MuscleProblem) -> list[str]:
-    """Differences of the model in FEBio, in sentences with their numbers: springs at points, bones that overlap at rest."""
+    """Differences of the model in FEBio, in sentences with their numbers: regions, springs at points, bones that overlap."""
     # Springs that the reference has over facets too are the same in FEBio.
     on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
-    return [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else []), *_overlapping(problem)]
+    springs = [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else [])]
+    return [*febio_regions.note(problem), *springs, *_overlapping(problem)]
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:

@@ -13,35 +13,38 @@ from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
+from fem_reference.export.febio_regions import Piece, parts
 from fem_reference.problems.muscle import MuscleProblem
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
 
 def add_materials(root: Element, problem: MuscleProblem) -> None:
-    """The muscle's material, number 1, and a rigid one for each bone."""
-    materials = SubElement(root, "Material")
-    _muscle(materials, problem.effects)
-    for number, bone in enumerate(problem.bones, start=2):
+    """The materials of the parts of the muscle, numbers from 1 on, and a rigid one for each bone."""
+    materials, own = SubElement(root, "Material"), parts(problem)
+    for number, part in enumerate(own, start=1):
+        _muscle(materials, number, part)
+    for number, bone in enumerate(problem.bones, start=len(own) + 1):
         rigid = SubElement(materials, "material", id=str(number), name=bone_id(bone), type="rigid body")
         middle = bone.surface.points.mean(axis=0)
         turned_about = None if bone.motion is None else bone.motion.centre
         leaves(rigid, {"density": 1e-9, "center_of_mass": vector(middle if turned_about is None else turned_about)})
 
 
-def _muscle(materials: Element, effects: Sequence[Effect]) -> None:
+def _muscle(materials: Element, number: int, part: Piece) -> None:
     """One material where FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
-    matrix, volume = matrix_constants(effects), volume_constants(effects)
+    matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
-    passive = next((effect for effect in effects if isinstance(effect, FibrePassive)), None)
+    passive = [effect for effect in part.effects if isinstance(effect, FibrePassive)]
     outer = "uncoupled solid mixture" if passive else kind
-    muscle = SubElement(materials, "material", id="1", name="muscle", type=outer)
+    muscle = SubElement(materials, "material", id=str(number), name=part.name, type=outer)
     _leaves(muscle, volume)
-    if passive is None:
+    if not passive:
         _leaves(muscle, matrix)
         return
     _leaves(SubElement(muscle, "solid", type=kind), matrix)
-    _leaves(SubElement(muscle, "solid", type="muscle material"), fibre_constants(passive))
+    for effect in passive:
+        _leaves(SubElement(muscle, "solid", type="muscle material"), fibre_constants(effect))
 
 
 def _leaves(parent: Element, constants: dict[str, float]) -> None:
@@ -67,7 +70,8 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
             found["c1"] += effect.c1
             found["c2"] += effect.c2
         elif isinstance(effect, FibrePassiveFebio):
-            found |= {"c3": effect.c3, "c4": effect.c4, "c5": effect.c5, "lam_max": effect.linear_from}
+            c3, c5 = (found.get(key, 0.0) + getattr(effect, key) for key in ("c3", "c5"))
+            found |= {"c3": c3, "c4": effect.c4, "c5": c5, "lam_max": effect.linear_from}
     return found
 
 
@@ -84,9 +88,11 @@ def add_fibres(root: Element, problem: MuscleProblem) -> None:
     """The axes of each element: the first along the fibre, the second anywhere across it."""
     if problem.directions is None:
         return
-    data = SubElement(SubElement(root, "MeshData"), "ElementData", type="mat_axis", elem_set="muscle")
+    section = SubElement(root, "MeshData")
     across = np.cross(problem.directions, np.eye(3)[np.abs(problem.directions).argmin(axis=1)])
-    for i, (a, d) in enumerate(zip(problem.directions, across, strict=True), start=1):
-        axes = SubElement(data, "e", lid=str(i))
-        leaf(axes, "a", vector(a))
-        leaf(axes, "d", vector(d / np.linalg.norm(d)))
+    for part in parts(problem):
+        data = SubElement(section, "ElementData", type="mat_axis", elem_set=part.name)
+        for i, (a, d) in enumerate(zip(problem.directions[part.cells], across[part.cells], strict=True), start=1):
+            axes = SubElement(data, "e", lid=str(i))
+            leaf(axes, "a", vector(a))
+            leaf(axes, "d", vector(d / np.linalg.norm(d)))

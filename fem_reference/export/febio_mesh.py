@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.export.febio_regions import MUSCLE, parts
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, corner_areas, enclosed_volume
 from fem_reference.geometry.distance import distances
@@ -138,7 +139,7 @@ class Mesh:
 
     def add_to(self, root: Element) -> None:
         """The section ``Mesh``: sets and surfaces after all nodes and elements."""
-        mesh, groups = SubElement(root, "Mesh"), [("muscle", "tet10", self.points, self.tets)]
+        mesh, groups = SubElement(root, "Mesh"), [(MUSCLE, "tet10", self.points, self.tets)]
         for bone in self.problem.bones:
             surface = outward(bone.surface)
             groups.append((bone_id(bone), "tri3", surface.points, surface.triangles))
@@ -147,10 +148,11 @@ class Mesh:
         cells = {name: own + first for (name, _, _, own), first in zip(groups, before, strict=True)}
         for (name, _, points, _), first in zip(groups, before.tolist(), strict=True):
             rows(SubElement(mesh, "Nodes", name=f"{name}_nodes"), "node", points.tolist(), first + 1)
-        number = 1
-        for name, kind, _, _ in groups:
-            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), number)
-            number += len(cells[name])
+        own = {part.name: ("tet10", self.tets[part.cells]) for part in parts(self.problem)}
+        elements, number = own | {name: (kind, cells[name]) for name, kind, _, _ in groups[1:]}, 1
+        for name, (kind, nodes) in elements.items():
+            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (nodes + 1).tolist(), number)
+            number += len(nodes)
         self._attached(mesh)
         if self.problem.obstacles:
             self._contact_surface(mesh, cells)

@@ -22,7 +22,7 @@ def check(folder: Path) -> None:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into: ``folder`` when all went well, else gone; InputError where that is not free."""
+    """A folder to write into, which becomes ``folder`` on success and is removed otherwise; InputError where that is not free."""
     folder = folder.resolve()
     check(folder)
     files.clear(folder)
@@ -35,7 +35,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(part, ignore_errors=True)
         for parent in above:
-            with suppress(OSError):  # where something is in it, as when all went well
+            with suppress(OSError):  # not empty, as after success
                 parent.rmdir()
 
 

@@ -36,10 +36,10 @@ INDEX = "runs.pvd"
 _NO_STATES = """
 The reference was solved without `reference.store_state = true`: the arrays that follow from its states are not here.
 """
-# What is evaluated of states; displacement apart.
+# Results that are evaluated from states; displacement is written anyway.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
-# The greatest of each distance to the reference, by what its error bar is called.
+# The statistic of the greatest distance to the reference, by the name of its error bar.
 _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
@@ -73,7 +73,9 @@ class _Frames:
         self.results, self.within = _states(comparison), None
         if self.results is not None:
             found = embed(self.results.mesh, self.setup.surface.points)
-            inside = np.clip(found.barycentric, 0, None)  # a vertex outside of the tetrahedra has what is at their skin
+            inside = np.clip(
+                found.barycentric, 0, None
+            )  # a vertex outside of the tetrahedra has the values at their skin
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
         self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
@@ -114,7 +116,7 @@ class _Frames:
         return np.where(self.setup.free, pressures, 0.0)
 
     def blocks(self, i: int) -> Tree:
-        """Those of the frame of index ``i``."""
+        """The blocks of the frame of index ``i``."""
         number, rest = self.reference.numbers[i], self.setup.surface
         bones = {}
         for bone in self.setup.bones:
@@ -128,7 +130,6 @@ class _Frames:
         return {"reference": own, "candidates": runs, "bones": bones, "attachments": attachments}
 
     def _run(self, run: Run, i: int) -> dict[str, DataBlock]:
-        """The blocks of a ``run`` at a frame."""
         blocks, frame = {}, run.numbers[i]
         state = self.results if run is self.reference else None
         state = None if state is None or frame not in state.frames else state
@@ -152,7 +153,7 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
+    """The tetrahedra of a reference, with results that jump between them at their middles, and the least det F at their corners."""
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)
@@ -160,7 +161,7 @@ def interior(made: Results, frame: float) -> DataBlock:
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
     displacement = np.zeros_like(mesh.points)
-    displacement[mesh.tets] = made.states[frame].displacement[:, :4]  # of nodes the corners come first
+    displacement[mesh.tets] = made.states[frame].displacement[:, :4]  # the corners are the first nodes
     return DataBlock(mesh.points, mesh.tets, {"displacement": displacement}, cells)
 
 
@@ -180,13 +181,13 @@ def _states(comparison: Comparison) -> Results | None:
 
 
 def _moved(rest: Floats, now: Floats) -> dict[str, Floats]:
-    """The displacement of points at ``rest``; of points that are nowhere none, so that there is something to see."""
+    """The displacement of points at ``rest``; 0 for points without a position, so that they can be drawn."""
     known = np.isfinite(now)
     return {"displacement": np.where(known, now - np.where(known, rest, 0.0), 0.0)}
 
 
 def _part(rest: Surface, vertices: Ints, now: Floats) -> DataBlock:
-    """The triangles of a surface with all corners among ``vertices``, and these alone; there may be no triangle."""
+    """The triangles of a surface with all corners among ``vertices``, if any, and only these vertices."""
     chosen = rest.triangles[np.isin(rest.triangles, vertices).all(axis=1)]
     own = np.unique(vertices)
     return DataBlock(rest.points[own], np.searchsorted(own, chosen), _moved(rest.points[own], now[own]))

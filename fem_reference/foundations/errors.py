@@ -2,14 +2,14 @@
 
 import errno
 
-# What the system calls a disk, or a share of one, that is full, and a file that is too large.
+# Error numbers of a full disk, an exhausted quota and a file that is too large.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# Of what was got, a message shows this many characters.
+# The most characters of a value that a message shows.
 _SHOWN = 400
 
 
 class InputError(Exception):
-    """Unusable input: the place (file and key), what was got and what is wanted.
+    """Unusable input: its place (file and key), the given value and the wanted one.
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'
@@ -20,12 +20,12 @@ class InputError(Exception):
         self.place, self.got, self.want = place, got, want
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
-        """Enough to go from one process to another."""
+        """The class and its arguments, so that an error can be passed to another process."""
         return type(self), (self.place, self.got, self.want)
 
 
 def _shown(value: object) -> str:
-    """A value on one line that a terminal shows as it is: not too long, and without control characters."""
+    """A value as one line of text for a terminal: shortened, and without control characters."""
     text = str(value)
     if len(text) > _SHOWN:
         text = f"{text[: _SHOWN // 2]} ... {text[-_SHOWN // 4 :]}"

@@ -25,7 +25,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 def _checked(value: object) -> str:
-    """The text of a formula; ValueError where it is none."""
+    """The text of a formula; ValueError where ``value`` is not a formula."""
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max:
         return repr(float(value))
     if not isinstance(value, str) or len(value) > _LONGEST:
@@ -45,7 +45,7 @@ Formula = Annotated[str, BeforeValidator(_checked)]
 
 
 def evaluate(text: str, position: Sequence[Any], functions: Mapping[str, Any]) -> Any:
-    """The value of ``text`` at ``position``, whose entries are x, y, z, as many as there are; ``functions`` by name.
+    """The value of the formula ``text`` at a ``position`` (x, y, z or the first of these); ``functions``: callables by name.
 
     >>> evaluate("x**2/2 - 2*x", (1.0,), {})
     -1.5

@@ -1,4 +1,4 @@
-"""Arguments of callers from Python, of any type: in words for messages, or as a path."""
+"""Arguments of any type from callers in Python: described for messages, or checked as a path."""
 
 from pathlib import Path
 from typing import Any
@@ -22,5 +22,5 @@ def path(given: Any, place: str) -> Path:
         Path(given).resolve()
         str(given).encode()
     except (OSError, ValueError) as error:  # too long, or with a null character
-        raise InputError(place, said(given), f"a path that can be there ({error})") from error
+        raise InputError(place, said(given), f"a path that can exist ({error})") from error
     return Path(given)

@@ -1,6 +1,6 @@
 """Indicators of the effects that a case needs, estimated before anything is solved.
 
-Hierarchical modelling decides what a model must have by an indicator of the modelling error (Oden and Prudhomme 2002,
+Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
 doi 10.1006/jcph.2002.7183). Here these are the displacement [mm] and the stress [MPa] that the effect causes, estimated from rest
 geometry, motion and parameters, beside the accuracy asked for. An isometric contraction displaces nothing; all of it is stress.
 """
@@ -13,7 +13,7 @@ from typing import Any
 @dataclass(frozen=True)
 class Indicator:
     """Indicator of an effect: an ``estimate`` [mm] of the displacement of the surface that it causes, root mean square at the
-    worst frame; the greatest ``stress`` [MPa] there; and the ``number`` by which it is known, with its ``rule``.
+    worst frame; the greatest ``stress`` [MPa] there; and the ``number`` from which both follow, with its ``rule``.
     """
 
     rule: str
@@ -24,9 +24,9 @@ class Indicator:
 
 @dataclass(frozen=True)
 class Near:
-    """Nearness of the free surface to a bone: the guaranteed clearance ``gap`` [mm], for any error of the guess of where the
-    surface goes; the possible penetration ``depth`` [mm], root mean square over the surface at the worst frame; and the first
-    ``frame`` with the smallest gap.
+    """Nearness of the free surface to a bone: the guaranteed clearance ``gap`` [mm], whatever the error of the guessed surface
+    motion; the possible penetration ``depth`` [mm], root mean square over the surface at the worst frame; and the first ``frame``
+    with the smallest gap.
     """
 
     gap: float
@@ -41,11 +41,11 @@ class Estimates:
     ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its fibres at rest
     length, the mean over the frames; ``fixed``: the number of bones that it is attached to; ``sag``: the distance of its axis from
     the straight line between two of them; ``lean`` of fibres against that line, from 0 to 1; ``travel``: the greatest displacement
-    of its surface by the motion of the bones; ``stretch`` of fibres, by that of the line from one attachment to the other, the
-    smallest and the greatest; ``interval`` from a frame number to the next, None where the case does not say it; ``speed``, its
-    part ``sideways`` of that line, ``jump`` (of velocity from one instant to the next) and ``acceleration``: the greatest, by frame
-    numbers; ``frames``: all numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]: changes by which no
-    effect is needed; ``near``: nearness by bone.
+    of its surface by the motion of the bones; ``stretch``: the smallest and the greatest stretch of the line between the
+    attachments, taken for that of the fibres; ``interval`` between frame numbers, None where the case does not state it; the
+    greatest ``speed``, its part ``sideways`` to that line, ``jump`` (of velocity at an instant) and ``acceleration``, per frame
+    number; ``frames``: all frame numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]: an effect that
+    changes less is not needed; ``near``: nearness by bone.
     """
 
     length: float
@@ -68,9 +68,9 @@ class Estimates:
     near: Mapping[str, Near] = field(default_factory=dict)
 
     def bend(self, force: float) -> float:
-        """Displacement [mm], root mean square, of a beam with clamped ends of this length, thickness and shear modulus, of which
-        Young's is three, bent and sheared by a ``force`` per volume [N/mm3] (Timoshenko): 0.6 of its middle, halved: bending also
-        stretches. A body that nothing fixes goes as far as it is long.
+        """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
+        length, thickness and shear modulus are those of the muscle, its Young's modulus three times the latter. The mean is 0.6
+        of the displacement in the middle, halved because bending also stretches. A free body moves by its own length.
         """
         if not self.fixed:
             return self.length
@@ -79,17 +79,15 @@ class Estimates:
         return float(0.3 * middle) / (1 + self.taut(self.tension))
 
     def taut(self, pull: float) -> float:
-        """Stiffness that such a beam gains where its fibres ``pull`` [MPa], over its own."""
+        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, over its own."""
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
-        """Shift [mm], root mean square, of a bar with clamped ends along itself by a ``force`` per volume [N/mm3]: two thirds of
-        that of its middle.
-        """
+        """Shift [mm], root mean square, of a clamped bar along itself by a ``force`` per volume [N/mm3]: 2/3 of the greatest."""
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
-        """Lag [mm] of a body that forces would hold back by a ``distance``: no more than it travels."""
+        """Lag [mm] of a body that forces would delay by a ``distance`` [mm]: less than it travels."""
         return distance / (1 + distance / self.travel) if self.travel else 0.0
 
     def greatest(self, effect: Any) -> float:
@@ -97,19 +95,17 @@ class Estimates:
         return max(abs(float(effect.amount(frame))) for frame in self.frames)
 
     def straighten(self, pull: float) -> float:
-        """Displacement [mm] of the surface, root mean square, where fibres ``pull`` [MPa] at a beam with clamped ends: they take
-        out 0.6 of its sag at most, against its stiffness in bending; fibres that lean shear it. Without two ends it can shorten.
+        """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
+        0.6 of its sag, against its bending stiffness; inclined fibres also shear it. Without two clamped ends it can shorten.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)
         return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
-        """Displacement [mm] of the surface, root mean square, where fibres ``pull`` [MPa] against the matrix: a ``share`` of the
-        length where they are far stronger.
-        """
+        """Displacement [mm] of the surface, root mean square, by fibres that ``pull`` [MPa]: at most a ``share`` of the length."""
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:
-        """A ``rate`` by frame numbers per second."""
+        """A ``rate`` per frame number, converted to one per second; 0 where the frame interval is not known."""
         return rate / self.interval if self.interval else 0.0

@@ -1,4 +1,4 @@
-"""Numbers with their first and second derivatives: whatever is computed from them is differentiated exactly, without steps."""
+"""Numbers with their first and second derivatives: expressions of them are differentiated exactly, without finite differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from fem_reference.foundations.mesh import Floats
 @dataclass(frozen=True, eq=False)
 class Jet:
     """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,); the
-    curvature is None where nobody asks for it, which saves nine tenths of the work.
+    curvature is None where it is not needed, which saves nine tenths of the work.
 
-    Along the points, a slope or curvature that is the same at all has length 1; values combined with a jet have as many axes as
+    A slope or curvature that is the same at all points has length 1 along them. Arrays combined with a jet have as many axes as
     its points, or none.
     """
 
@@ -23,10 +23,10 @@ class Jet:
     slope: Any
     curvature: Any = None
 
-    __array_ufunc__ = None  # an array on the left leaves it to the jet
+    __array_ufunc__ = None  # an array on the left lets the jet compute
 
     def chained(self, value: Any, first: Any, second: Any) -> "Jet":
-        """A function of the jet, whose ``value``, ``first`` and ``second`` derivative at ``self.value`` are given."""
+        """A function of the jet, given its ``value`` and its ``first`` and ``second`` derivatives at ``self.value``."""
         if self.curvature is None:
             return Jet(value, first * self.slope, None)
         outer = self.slope[:, None] * self.slope[None]
@@ -86,7 +86,7 @@ def constant(value: Any, like: Jet) -> Jet:
 
 
 def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable[[Any], Any]:
-    """A ``function`` that gives its value, first and second derivative, as one of jets, numbers and arrays."""
+    """A function of jets, numbers or arrays; ``function`` returns its value with its first and second derivatives."""
 
     def of(x: Any) -> Any:
         return x.chained(*function(x.value)) if isinstance(x, Jet) else function(np.asarray(x, float))[0]
@@ -96,17 +96,13 @@ def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable
 
 def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
-    chosen = _value(x) > _value(limit)
+    chosen = getattr(x, "value", x) > getattr(limit, "value", limit)
     like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
     if like is None:
         return np.where(chosen, then, otherwise)
     one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
     parts = ("value", "slope") if one.curvature is None else ("value", "slope", "curvature")
     return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
-
-
-def _value(x: Any) -> Any:
-    return x.value if isinstance(x, Jet) else x
 
 
 # The functions of jets, numbers and arrays.

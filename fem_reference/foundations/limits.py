@@ -1,4 +1,4 @@
-"""The range of deformation in which a law is valid, that of a parameter in the literature, and how well energy and work agree."""
+"""Ranges of deformation in which a law is valid and of parameters in the literature, and the tolerance of the energy balance."""
 
 from dataclasses import dataclass
 from math import inf
@@ -6,11 +6,11 @@ from typing import Literal
 
 from fem_reference.foundations.records import Record
 
-# Energy that grew without work, or was lost, within a load step, as a share of the greatest so far: beyond it a state halfway is
-# looked at, and what then remains makes a run doubtful.
+# The accepted difference of energy and work in a load step, as a share of the greatest energy so far. Above it the state halfway
+# is checked too; a difference that remains makes the run doubtful.
 ENERGY_GAP = 0.05
 
-# V/V0 is det F; the fibre stretch is that of the energies: isochoric, and with what is prestretched.
+# V/V0 is det F; the fibre stretch is the one in the energies: isochoric, with the prestretch.
 Measure = Literal["V/V0", "fibre stretch"]
 
 
@@ -25,7 +25,7 @@ class Limit:
 
 class Range(Record):
     """The range of a parameter in the literature, from ``low`` to ``high`` as scene files write them, and its ``source``. All
-    values in it are taken for equally likely (``spread`` ``"uniform"``), or their logarithms (``"log-uniform"``).
+    values in it count as equally likely (``spread`` ``"uniform"``), or all their logarithms (``"log-uniform"``).
     """
 
     low: str | float

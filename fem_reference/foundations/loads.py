@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their force and moment, and what they depend on of its shape."""
+"""Loads on a body: their amounts over time, their force and moment, and the integrals of its shape that give these."""
 
 from typing import NamedTuple, Protocol
 

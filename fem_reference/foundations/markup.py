@@ -1,4 +1,4 @@
-"""Small tables in HTML, by which records show themselves in a notebook, and values as text."""
+"""Small HTML tables that show records in a notebook, and values as text."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape

@@ -1,4 +1,4 @@
-"""The state at a point of a body, with the invariants that laws are written in, and the functions that they may call."""
+"""The state at a point of a body, with the invariants and functions in which laws are written."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,15 +27,13 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return np.where(x > limit, then, otherwise)
 
 
-# Before the name of a region: the rest of the body.
+# The prefix of a region's name that means the rest of the body.
 REST = "not "
 NUMPY = Functions(np.exp, np.log, np.sqrt, np.cos, np.sin, _above)
 
 
 class Moduli(NamedTuple):
-    """Stiffness at rest [MPa]: ``shear`` (across the fibres, where there are some), ``bulk``, and the stress that scales the
-    stiffness of ``fibres``; 0 where there is none.
-    """
+    """Stiffness at rest [MPa], 0 for none: ``shear`` (across fibres, if any), ``bulk``, and the scaling stress of ``fibres``."""
 
     shear: float = 0.0
     bulk: float = 0.0
@@ -48,10 +46,10 @@ class State:
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
     unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
-    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
-    step starts from, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] where velocities alone would lead it, and
-    ``rate`` [1/s] one over the time that it takes, 0 where no time passes; ``regions``: the share, from 0 to 1, that the point has
-    in each region of the body.
+    none; ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] at the start of
+    the load step, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] the displacement at constant velocity, ``rate``
+    [1/s] one over the duration of the step, 0 in a quasi-static one; ``regions``: the share, from 0 to 1, that the point has in
+    each region of the body.
     """
 
     F: Sequence[Sequence[Any]]
@@ -67,9 +65,7 @@ class State:
     functions: Functions = NUMPY
 
     def share(self, region: str) -> Any:
-        """The share, from 0 to 1, that the point has in a ``region``: a name, ``"not NAME"`` for the rest of the body, or ``""``
-        for all of it.
-        """
+        """The share, from 0 to 1, of the point in a ``region``: a name, ``"not NAME"`` for the rest, or ``""`` for the body."""
         if region.startswith(REST):
             return 1 - self.regions[region.removeprefix(REST)]
         return self.regions[region] if region else 1.0
@@ -111,7 +107,7 @@ class State:
 
     @property
     def fibre_stretch(self) -> Any:
-        """``J^(-1/3) |F fibre|``: the stretch of the fibre, without its share in the change of volume."""
+        """``J^(-1/3) |F fibre|``: the isochoric stretch of the fibre."""
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
     def stretched(self, along: Any) -> Sequence[Sequence[Any]]:
@@ -140,7 +136,7 @@ class FieldState:
 
 @dataclass(frozen=True)
 class Place:
-    """A point at which a field effect acts: the ``position`` (x, y, z as far as they exist), the ``functions`` of formulas, and
+    """A point at which a field effect acts: the ``position`` (x, y, z or the first of these), the ``functions`` of formulas, and
     ``upper``, the share of the element above the mean y of the vertices.
     """
 
@@ -150,7 +146,7 @@ class Place:
 
 
 def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:
-    """The force per rest area [MPa] along fibres of a ``stretch`` at constant volume, by central differences of an ``energy``."""
+    """The force per rest area [MPa] along fibres at a ``stretch`` and constant volume, by central differences of an ``energy``."""
 
     def along(length: float) -> float:
         across = length**-0.5

@@ -25,7 +25,7 @@ TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
-    """A copy of ``values`` that nobody can write to."""
+    """A read-only copy of ``values``."""
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
@@ -33,7 +33,7 @@ def read_only(values: Any, dtype: type) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A triangle surface: ``points`` (n, 3) [mm], ``triangles`` (m, 3); ``place`` says where it came from, for messages."""
+    """A triangle surface: ``points`` (n, 3) [mm], ``triangles`` (m, 3); ``place`` names its source in messages."""
 
     points: Floats
     triangles: Ints
@@ -51,7 +51,7 @@ class Surface:
 @dataclass(frozen=True, eq=False)
 class TetMesh:
     """Tetrahedra: ``points`` (n, 3) [mm], ``tets`` (k, 4), all of positive volume; ``facets`` maps the name of a region of the
-    boundary to its triangles (m, 3); ``maker`` names the mesher, where one made it.
+    boundary to its triangles (m, 3); ``maker`` names the mesher, if any.
     """
 
     points: Floats
@@ -139,7 +139,7 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
 
 
 def check_finite(surface: Surface) -> None:
-    """InputError when there are no triangles, a point is not finite or a triangle names a point that is not there."""
+    """InputError where there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -153,7 +153,7 @@ def check_finite(surface: Surface) -> None:
 
 
 def check_corners(surface: Surface) -> None:
-    """InputError where a triangle names a point that is not there."""
+    """InputError where a triangle has a vertex that does not exist."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
         want = f"0 to {len(surface.points) - 1}"
         raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
@@ -162,7 +162,7 @@ def check_corners(surface: Surface) -> None:
 def check_closed(surface: Surface) -> Surface:
     """The surface, outward, if it bounds one body: finite, closed, manifold, consistently oriented, every point used.
 
-    InputError otherwise, with the number of offending edges, vertices or parts and where the first or smallest is.
+    InputError otherwise, with the number of offending edges, vertices or parts and the place of the first or smallest.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -176,7 +176,7 @@ def check_closed(surface: Surface) -> Surface:
             first = place_of(points[wrong[0]].mean(axis=0))
             raise InputError(surface.place, f"{len(wrong)} {what}, the first at {first}", want)
     if twice := len(directed) - len(np.unique(directed, axis=0)):
-        got = f"{twice} edges that both their triangles run in the same direction"
+        got = f"{twice} edges along which both triangles have the same direction"
         raise InputError(surface.place, got, "one orientation")
     if lost := len(points) - len(np.unique(triangles)):
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")
@@ -194,8 +194,8 @@ def twins(triangles: Ints) -> Ints:
 
 
 def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
-    """The number (count,) of the fan that each corner of triangles is in: around a vertex, those between which side ``one`` (e,)
-    is side ``other`` (e,), numbered as by :func:`twins`.
+    """The number (count,) of the fan of each corner of triangles: corners around a vertex are in one fan if edges connect their
+    triangles. The sides ``one`` (e,) and ``other`` (e,) of each edge are numbered as by :func:`twins`.
     """
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     return connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), count)
@@ -208,9 +208,7 @@ def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
 
 
 def _check_parts(surface: Surface) -> None:
-    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan, or where its triangles,
-    connected by edges, are more than one part.
-    """
+    """InputError where a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
     one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
     _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)

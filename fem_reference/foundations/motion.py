@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 
-# Frame numbers between which a motion is steady, straight or about one axis, and the angle [rad] that it has turned by at each.
+# Frame numbers between which a motion is steady (straight, or about one axis), and the angle [rad] of the rotation at each.
 Turning = tuple[tuple[float, ...], tuple[float, ...]]
 
 
@@ -49,7 +49,7 @@ class RigidMotion:
         return np.asarray(self.axis, float) / np.linalg.norm(self.axis)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The keyframes; nothing turns between those of what slides."""
+        """The keyframes and the angles [rad] there, all 0 where the bone slides."""
         return self.frames, self.amounts if self.centre is not None else (0.0,) * len(self.frames)
 
 

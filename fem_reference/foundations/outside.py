@@ -19,7 +19,7 @@ def folders() -> list[str]:
 
 @cache
 def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[Record], ...]) -> type[Record]:
-    """The one record of ``kinds`` that a ``module`` defines, whose file stands in one of the ``places`` and in no other."""
+    """The one record of ``kinds`` that a ``module`` defines, whose file is in exactly one of the ``places``."""
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
     if len(found) > 1:

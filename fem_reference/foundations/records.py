@@ -43,7 +43,7 @@ def increasing(values: Sequence[float] | None, want: str) -> Any:
 
 
 def directed(vector: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    """The ``vector`` that is the ``name`` of a direction; ValueError where it has none to speak of."""
+    """The ``vector``; ValueError, with its ``name``, where its length is not from 1e-9 to 1e9."""
     if not 1e-9 < math.hypot(*vector) < 1e9:
         raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
     return vector
@@ -63,7 +63,7 @@ def _check_file_name(name: str) -> str:
 
 
 def check_once(names: Sequence[str], place: str) -> None:
-    """Raise InputError where one of ``names`` is there twice."""
+    """Raise InputError where one of ``names`` occurs twice."""
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError(place, f'the name "{twice}" twice', "every name once")
@@ -73,15 +73,15 @@ def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str
     """Raise InputError where one of the ``uses``, (key, name) each, is of a name that is not ``known``."""
     for key, name in uses:
         if name not in known:
-            want = f"one of {', '.join(known)}" if known else "a name that is there: there is none"
+            want = f"one of {', '.join(known)}" if known else "none, as none is defined"
             raise InputError(join(place, key), f'"{name}"', want)
 
 
 _SHOWN = 12  # errors of one file
-# What pages and messages call something.
 _LONGEST_NAME = 100
+# A name in pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]
-# A name that a file or folder can have too.
+# A name that is also valid for a file or folder.
 FileName = Annotated[str, AfterValidator(_check_file_name)]
 
 
@@ -93,19 +93,19 @@ def parse[R](record: type[R], table: object, place: str) -> R:
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
-        # Unknown keys first: where a key is mistyped, it says more than that the right one is missing.
+        # Unknown keys first: a mistyped key explains more than the missing one that was meant.
         wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
         raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
 
 
 def _own(errors: Sequence[Any]) -> list[Any]:
-    """``errors`` without lists that are too short because of what is wrong inside them."""
+    """``errors`` without those of lists that are too short only because their entries are wrong."""
     inside = {one["loc"][:i] for one in errors for i in range(len(one["loc"]))}
     return [one for one in errors if one["type"] != "too_short" or one["loc"] not in inside]
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error that says all that is ``wrong``, the first at length; each key once."""
+    """One error for all that are ``wrong``, the first with its own place, one for each key."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -143,14 +143,14 @@ def _as_input_error(first: Any, record: type, place: str, table: object) -> Inpu
 
 
 def _keys(table: object, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """``path`` without what follows a value that is no table or list: where several types are allowed, pydantic names those."""
+    """The part of ``path`` inside tables and lists; pydantic adds the names of types where several are allowed."""
     inside: Any = table
     for i, part in enumerate(path):
         if not hasattr(inside, "__getitem__") or isinstance(inside, str):
             return path[:i]
         try:
             inside = inside[part]
-        except (KeyError, IndexError, TypeError):  # what is missing is named too
+        except (KeyError, IndexError, TypeError):  # a missing key belongs to the path
             return path
     return path
 

@@ -1,4 +1,4 @@
-"""Python processes of our own: how they are started and ended, the resources that they use, and folders that they share.
+"""Python subprocesses: their start and end, the resources that they use, and folders that they share.
 
 They import this copy of the package and nothing from the folder that they are started in.
 """
@@ -21,12 +21,12 @@ from filelock import FileLock, Timeout
 _STARTER = "FEM_REFERENCE_STARTER"
 _ROOT = Path(__file__).resolve().parent.parent.parent
 _PREFIX, _LOCK = "fem_reference_scratch-", ".lock"
-# So old [s] is a folder without a lock that nobody is about to take.
+# Age [s] above which a folder whose lock is free is abandoned, and not about to be locked.
 _SETTLED = 60.0
 
 
 def command(*words: str) -> list[str]:
-    """The command line of a Python that does not look for modules where it is started, with ``words`` behind it."""
+    """The command line of a Python that ignores modules in its working directory, followed by ``words``."""
     return [sys.executable, "-P", *words]
 
 
@@ -57,7 +57,7 @@ def lives(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except ProcessLookupError:
         return False
-    except (OSError, IndexError):  # it is another's, or there is no /proc
+    except (OSError, IndexError):  # it belongs to another user, or there is no /proc
         return True
 
 
@@ -68,8 +68,8 @@ def forget_peak_memory() -> None:
 
 
 def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]:
-    """The processor time [s] by number of a ``process`` and of each that descends from it and has not ended, with that of the ended
-    ones that it waited for if ``of_ended``; nothing where the system does not say.
+    """Processor times [s] by process number, of a ``process`` and its running descendants; with ``of_ended`` each includes those of
+    the ended subprocesses it waited for. Empty where the system does not report them.
     """
     parents, times = dict[int, int](), dict[int, float]()
     for folder in Path("/proc").glob("[0-9]*"):
@@ -86,8 +86,8 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
 
 
 class MachineTime(NamedTuple):
-    """A moment: by the clock [s], the processor time [s] of this process with all that descend from it, and that of all processes
-    of the machine, NaN where the system does not say.
+    """A moment: the time by the clock [s], the processor time [s] of this process and its descendants, and that of all processes of
+    the machine, NaN where the system does not report it.
     """
 
     seconds: float
@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The share of the machine that other processes have kept busy since then, None where the system does not say."""
+        """The share of the machine used by other processes since then, None where the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
@@ -121,7 +121,7 @@ def spent_since(before: MachineTime) -> dict[str, str]:
 
 
 def peak_memory(process: int | None = None) -> float:
-    """The most memory [MB] since then, or since this process began; of another ``process``, 0 where the system does not say."""
+    """The peak memory [MB] since :func:`forget_peak_memory` or the start; of another ``process``, 0 where it is not reported."""
     with suppress(OSError, StopIteration):
         lines = Path(f"/proc/{process or 'self'}/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
@@ -137,7 +137,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def _clear(root: Path) -> None:
-    """Remove what processes that were killed have left; what is not ours to remove stays."""
+    """Remove folders that killed processes left; those that may not be removed stay."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

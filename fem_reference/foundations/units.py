@@ -18,8 +18,8 @@ LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft"
 
 
 class Kind(NamedTuple):
-    """A kind of quantity: the ``unit`` that its numbers have inside, ``examples`` of one and of three in a file, the ``greatest``
-    magnitude, beyond all that exists and where digits are not lost, and the ways to write the unit of what has none.
+    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three in a file, the ``greatest`` magnitude accepted,
+    above any real one and without loss of digits; for a kind without a unit, the texts accepted in its place.
     """
 
     unit: str
@@ -28,7 +28,7 @@ class Kind(NamedTuple):
     written: tuple[str, ...] = ()
 
 
-# By what people call them. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
+# By name. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
 KINDS = {
     "a length": Kind("mm", ('"2 mm"', '"146, 238, -431 mm"'), 1e9),
     "an angle": Kind("rad", ('"30 deg"', '"0, 0, 30 deg"'), 1e6),
@@ -49,21 +49,44 @@ KINDS = {
     "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
     "a rate": Kind("1/s", ('"5 1/s"',)),
 }
-# A number, then what may be a unit.
+# Common units, by unit and internal unit, with the factors of pint, whose import takes 0.4 s.
+COMMON = {
+    ("cm", "mm"): 10.0,
+    ("m", "mm"): 1000.0,
+    ("deg", "rad"): math.pi / 180,
+    ("Pa", "MPa"): 1e-6,
+    ("kPa", "MPa"): 1e-3,
+    ("GPa", "MPa"): 1000.0,
+    ("%", ""): 0.01,
+    ("ms", "s"): 1e-3,
+    ("kg/m^3", "tonne/mm^3"): 1.0000000000000002e-12,
+    ("m/s^2", "mm/s^2"): 1000.0,
+    ("Pa/mm", "MPa/mm"): 1e-6,
+    ("kPa/mm", "MPa/mm"): 1e-3,
+    ("mPa s/mm^2", "MPa*s/mm^2"): 1e-9,
+    ("Pa s/mm^2", "MPa*s/mm^2"): 1e-6,
+    ("Pa s", "MPa*s"): 1e-6,
+    ("kPa s", "MPa*s"): 1e-3,
+    ("N/m", "N/mm"): 1e-3,
+    ("N s/m", "N*s/mm"): 1e-3,
+    ("N mm", "N*mm"): 1.0,
+    ("N m", "N*mm"): 1000.0,
+}
+# A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
-# What a unit may not have: an exponent that is no integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
+# Forbidden in a unit: an exponent that is no integer of one or two digits, or has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
-# The most characters of a quantity, and of three.
+# The most characters of a quantity.
 _LONGEST = 100
-# The least that a quantity above zero must be, in its unit inside.
+# The smallest accepted quantity above zero, in its internal unit.
 _SMALLEST = 1e-30
-# Where an exponent follows a unit without a sign for it, as in m3.
+# The place of an exponent that follows a unit without a sign, as in m3.
 _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 
 @cache
 def _registry() -> Any:
-    import pint  # a sixth of a second, for processes that read no text
+    import pint  # here, as it takes 0.4 s, which processes that read common units alone save
 
     return pint.UnitRegistry(cache_folder=None)
 
@@ -83,16 +106,26 @@ def quantity(text: object, kind: str) -> float:
     if not number or unit not in (own.written or (unit,)) or _NO_UNIT.search(unit):
         raise wrong
     try:
-        read = _registry().Quantity(float(number), _registry().parse_units(unit))
-        value = float(read.to(own.unit or "dimensionless").magnitude)
-        same = read.to_root_units().units == _registry().Quantity(1.0, own.unit).to_root_units().units
+        value = float(number) * _factor(unit, own.unit)
     except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
         raise wrong from error
-    if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit distinguishes it
+    if not math.isfinite(value):
         raise wrong
     if abs(value) > own.greatest:
         raise ValueError(f"{kind} of at most {own.greatest:g} {own.unit}".rstrip())
     return value
+
+
+@cache
+def _factor(unit: str, inside: str) -> float:
+    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, where the two are not of one kind."""
+    if unit == inside or (unit, inside) in COMMON:
+        return COMMON.get((unit, inside), 1.0)
+    one = _registry().Quantity(1.0, _registry().parse_units(unit))
+    factor = float(one.to(inside or "dimensionless").magnitude)
+    # To pint an angle has no dimension, its root unit distinguishes it.
+    same = one.to_root_units().units == _registry().Quantity(1.0, inside).to_root_units().units
+    return factor if same else math.nan
 
 
 def _split(text: object) -> tuple[str, str]:
@@ -155,7 +188,7 @@ LengthUnit = Annotated[float, BeforeValidator(length_unit)]
 
 
 def unit_of(metadata: Sequence[object]) -> str:
-    """The unit inside of a field with the ``metadata`` of a type of this module; empty where it has none.
+    """The internal unit of a field with the ``metadata`` of a type of this module; empty where it has none.
 
     >>> unit_of(Density.__metadata__), unit_of(())
     ('tonne/mm^3', '')
@@ -165,7 +198,7 @@ def unit_of(metadata: Sequence[object]) -> str:
 
 
 def field_unit(field: Any) -> str:
-    """The unit inside of a ``field`` of a record, which stands with its type, or with one of several; empty where it has none."""
+    """The internal unit of a ``field`` of a record, by its type or one of its types; empty where it has none."""
     inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in kinds(field.annotation))
     return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
 
@@ -176,7 +209,7 @@ def kinds(annotation: Any) -> list[Any]:
 
 
 def written(value: Any, unit: str) -> Any:
-    """A number, or three, as text with the ``unit`` that it has inside; values without a unit, and texts, unchanged.
+    """A number, or three, as text with its internal ``unit``; values without a unit, and texts, unchanged.
 
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)

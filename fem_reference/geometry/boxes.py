@@ -1,4 +1,4 @@
-"""Boxes along the axes around triangles and points, and which of two sets of them may touch."""
+"""Axis-aligned boxes around triangles and points, and a search for those of two sets that may touch."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -21,7 +21,7 @@ class Boxes:
 
     @cached_property
     def largest(self) -> Floats:
-        """The extent (3, 1) [mm] of the largest box along each axis, and what differences of coordinates are rounded by."""
+        """The extent (3, 1) [mm] of the largest box along each axis, plus the round-off of differences of coordinates."""
         rounding = 4 * np.finfo(float).eps * max(float(np.abs(side).max()) for side in (self.low, self.high))
         return np.asarray((self.high - self.low).max(axis=1, keepdims=True) + rounding)
 
@@ -56,9 +56,7 @@ def reached(one: Boxes, other: Boxes) -> Ints:
 
 
 def _near(one: Boxes, some: Ints, other: Boxes) -> Ints:
-    """The boxes (k,) of ``other`` that may touch ``some`` of ``one``: their low corners are in a cell of a regular grid into which
-    one of these reaches, extended by the largest of ``other``.
-    """
+    """The boxes (k,) of ``other`` whose low corner is in a grid cell that ``some`` of ``one`` reach, extended by the largest."""
     if not (len(some) and other.low.size):
         return np.zeros(0, np.int64)
     begin, end = np.take(one.low, some, axis=1) - other.largest, np.take(one.high, some, axis=1)

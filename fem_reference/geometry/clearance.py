@@ -51,9 +51,9 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
-    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. It is no lower than the
-    least of the 64 coefficients of its cell, and than the least of its Bernstein coefficients. Nor is it above the greatest of
-    them: cells deep inside need no check.
+    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell it is no lower than
+    the least of the 64 coefficients there, nor than the least of its Bernstein coefficients; it is no higher than the greatest
+    coefficient, so cells deep inside need no check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))

@@ -1,4 +1,4 @@
-"""Fewer triangles: a coarser surface of well-shaped ones on a fine one."""
+"""Coarsening of surfaces: fewer and well-shaped triangles on a fine surface."""
 
 import igl
 import numpy as np
@@ -13,7 +13,7 @@ _ROUNDS = 6
 # A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving
 # along it keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
 _FREE = 0.03
-# Distance of the inversion's pole in diagonals of the body: nearer, sharp edges move; farther, flat parts stay flat.
+# Distance of the inversion's pole in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
@@ -46,11 +46,7 @@ def resampled(surface: Surface, power: int) -> Surface:
 
 
 def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
-    """Points and triangles after quadric edge collapses to ``count``.
-
-    Quadrics leave flat parts undetermined, so the collapses happen in the image of a sphere inversion, which keeps
-    angles and bends planes to spheres.
-    """
+    """Points and triangles after quadric collapses, in a sphere inversion: on flat parts quadrics are undetermined."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     radius = _POLE * float(np.linalg.norm(high - low))
     pole = (low + high) / 2 + radius * np.array([0.48, 0.6, 0.64])
@@ -140,10 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] of the angles opposite to each edge over a straight one.
-
-    0 where a flip is not worthwhile, or the two triangles are not nearly in one plane before and after.
-    """
+    """The excess (e,) [rad] of the angles opposite to edges over a straight one; 0 where a flip is useless or would bend."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

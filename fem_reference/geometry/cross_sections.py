@@ -18,10 +18,10 @@ _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # points of a rim that are matched
 _REACH = 60  # samples by which a match may be ahead of the shift of the whole rim, or behind it
-_STEPS = (-1, 0, 1, 2, 3)  # samples that a match may gain on the one before: none passes another
-_STIFFNESS = 0.01  # of a rim's length: a rim twice as long costs as much as one so far away
+_STEPS = (-1, 0, 1, 2, 3)  # samples that a match may gain on the one before, so that matches stay in order
+_STIFFNESS = 0.01  # share of a rim's length: stretching the rim to twice its length costs as much as a distance of it
 _WINDOW = 9  # samples whose mean smooths a match
-_LEAST = 0.1  # share of the plain shift in a match: no two points meet
+_LEAST = 0.1  # share of the plain shift in a match, so that no two points coincide
 
 
 @dataclass(frozen=True, eq=False)

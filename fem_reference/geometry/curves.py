@@ -18,9 +18,7 @@ Curve = Callable[[Floats], Floats]
 
 
 def knots(points: Floats, exponent: float = 1.0) -> Floats:
-    """Parameters (n,) of ``points`` (n, d), from 0 to 1, whose differences are proportional to distance to the ``exponent``:
-    0 uniform, 0.5 centripetal, 1 chordal.
-    """
+    """Parameters (n,) of ``points`` (n, d), 0 to 1, with steps as distance**``exponent``: 0 uniform, 0.5 centripetal, 1 chordal."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():
         got = f"{len(points)} points, {int((steps == 0).sum())} repeated"

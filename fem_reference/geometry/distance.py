@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, norm
 
 # The distance of the sample point outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
-# So many triangles within another part, those farthest from what is not, are measured.
+# Triangles within another part whose depth is measured: those farthest from the uncovered ones.
 _WITHIN = 16
 
 
@@ -84,8 +84,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def flattened(surface: Surface, place: Floats) -> float:
-    """The distance of the middle of the flat triangle nearest to a ``place`` (3,) [mm] from a sphere through its corners, times the
-    sphere's radius [mm2]: what is curved between vertices is that far from its triangle.
+    """The distance of a sphere from the middle of the flat triangle nearest to a ``place`` (3,) [mm] whose corners lie on it, times
+    the radius of the sphere [mm2]: the error of a flat triangle on a curved surface.
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
@@ -111,8 +111,8 @@ def outer_windings(surface: Surface) -> Floats:
 
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
-    """The greatest depth [mm] of a middle of the triangles ``some`` (m,) within another part of the closed ``surface``, at least:
-    its distance from the nearest triangle behind which it is and that faces it. 0 where the surface goes nowhere through itself.
+    """A lower bound of the greatest depth [mm] of middles of the triangles ``some`` (m,) within another part of the closed
+    ``surface``: the distance of such a middle to the nearest opposing triangle in front of it. 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]
     middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5

@@ -1,4 +1,4 @@
-"""Point location in tetrahedra: the tetrahedron of each point and its barycentric coordinates, which carry a solution there."""
+"""Point location in tetrahedra: the tetrahedron of each point and its barycentric coordinates, which interpolate a solution."""
 
 from dataclasses import dataclass
 

@@ -37,8 +37,8 @@ class Exemption:
     """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each ``by`` (r,) the
     number of an attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
 
-    The reach is the ``spacing`` of the contact points: nearer to the attached part, a point would stand for attached area
-    too. It depends on the size of the surface and not on its triangles.
+    The reach is the ``spacing`` of the contact points: the area of a point nearer to the attached part would include attached
+    area. It depends on the size of the surface and not on its triangles.
     """
 
     surface: Surface

@@ -1,8 +1,8 @@
 """Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
 
-Theirs has isocontours on the surface; here each is the rim of a section of the Laplace field in tetrahedra, and the points inside
-come from a harmonic map of that section. On the sections the points are in the muscle, between them lines may leave it where it
-bends. A muscle with several heads is followed along its greatest section only; where that gains or loses a head, lines still turn.
+Their method uses isocontours on the surface. Here each contour is the rim of a section of the Laplace field in tetrahedra, and a
+harmonic map of that section gives the points inside. These are in the muscle; between sections, lines may leave it where it bends.
+A muscle with several heads is followed along its greatest section only; where that gains or loses a head, lines still turn.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing lays a parabola
-_FLAT = 1e-9  # twice the area of a triangle in the unit square: three points of one side have none
+_FLAT = 1e-9  # twice the area of a triangle in the unit square below which its points are on one side
 _SHORTEST = 0.1  # of the longest pennate fibre's extent along the muscle
 
 
@@ -36,7 +36,7 @@ class Contours:
 
     @property
     def width(self) -> float:
-        """The mean distance [mm] between the middles of the sides of the squares that their first side joins."""
+        """The mean width [mm] of the sections along the first side of their squares."""
         sides = np.array([[0.0, 0.5], [1.0, 0.5]])
         return float(np.mean([np.linalg.norm(np.diff(self._on(i, sides), axis=0)) for i in range(len(self.sections))]))
 

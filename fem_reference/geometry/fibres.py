@@ -17,7 +17,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
 POINTS = 40  # of each line
-_NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
+_NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
 # Seeds whose relative difference is less are ordered by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # a field of 1/2 up to round-off is above it
@@ -40,7 +40,7 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields that do not derive from others; only these are passed to other processes."""
+        """The fields without those derived from others, for other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
@@ -162,10 +162,7 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) on the section where the field is 1/2, away from the skin.
-
-    Where the section cuts a tet, the middle of the cut and the points halfway from there to its corners.
-    """
+    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut, and halfway to its corners."""
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
@@ -197,10 +194,7 @@ def _first_best(scores: Floats) -> int:
 
 
 def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[list[Floats], Bools]:
-    """Lines from ``seeds`` (k, 3) along the field (``sign`` 1) or against it (-1) to the attachment ``goal`` (m, 3).
-
-    The mask (k,) is True for lines that arrived there instead of leaving through the skin.
-    """
+    """Lines from ``seeds`` (k, 3) along (``sign`` 1) or against (-1) the field to ``goal`` (m, 3), and a mask (k,) of arrival."""
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
     going, points = np.arange(len(seeds)), seeds

@@ -58,8 +58,8 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
-POINTS = 5  # of the rules along each direction: exact up to degree 9
-# No coordinate is larger, so that areas and results computed from them are finite.
+POINTS = 5  # of the quadrature rules along each direction: exact up to degree 9
+# The greatest coordinate, so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
 
@@ -98,7 +98,7 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
     """The share (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner that is alone on its side cuts off a triangle similar in two directions.
+    # The corner that is alone on its side of the level is cut off: the area is as the product of the shares of its two edges.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)

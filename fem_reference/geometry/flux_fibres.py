@@ -1,8 +1,8 @@
-"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves it so over another.
+"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over another.
 
-The same flux passes each mm2 of an attachment, so lines that start evenly over one end evenly over the other, and leave no part of
-either out. The gradient of a potential that is constant on attachments gathers at their rims instead: in a sheet whose whole face
-is attached, nearly all lines start at the edge next to the other attachment.
+The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
+both. The gradient of a potential that is constant on attachments is concentrated at their rims instead: in a sheet whose whole
+face is attached, nearly all lines start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -26,16 +26,15 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # fibres
-_LINES = 1000  # at least so many are followed, and so many for each fibre wanted: those wanted are chosen from them
-_LINES_EACH = 8
-_ROUNDS = 50  # of Lloyd's algorithm; it has settled before
+_LINES, _LINES_EACH = 1000, 8  # lines that are followed, at least in all and per fibre; the fibres are chosen from them
+_ROUNDS = 50  # of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A flow without divergence through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], of 1 in all, in
-    by the facets ``start`` (m, 3), out by ``end``. ``faces`` (k, 4): the numbers of the triangles opposite the corners of each
+    """A divergence-free flow through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], with a flux of 1 in
+    all from the facets ``start`` (m, 3) to ``end``. ``faces`` (k, 4): the numbers of the triangles opposite the corners of each
     tetrahedron; ``rises`` (k, 4, 3) [1/mm]: the gradients of its barycentric coordinates.
     """
 
@@ -57,8 +56,8 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     """The flow from the facets ``start`` of a ``mesh`` to ``end``, even over the area of each, and none through the rest of the
     boundary: the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
-    By Crouzeix and Raviart's elements, whose gradients are the lowest order of Raviart and Thomas: what leaves a tetrahedron
-    enters the next exactly (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    The elements are Crouzeix and Raviart's, whose gradients are those of Raviart and Thomas of lowest order: the flux out of a
+    tetrahedron is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
@@ -73,7 +72,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     for facets, sign in ((mesh.facets[start], -1.0), (mesh.facets[end], 1.0)):
         areas = triangle_areas(mesh.points, facets)
         through[_numbers(triangles[first], facets)] += sign * areas / areas.sum()
-    potential = np.zeros(count)  # free by a constant: 0 on the first face
+    potential = np.zeros(count)  # defined up to a constant: 0 on the first face
     potential[1:] = splu(matrix[1:, 1:]).solve(through[1:])
     slopes = -3 * np.einsum("ki,kia->ka", potential[faces], rises)
     return Flow(mesh, mesh.facets[start], mesh.facets[end], faces, rises, slopes)
@@ -115,7 +114,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on the rim of one
     square = (0.5 + np.arange(1, count + 1)[:, None] / _PLASTIC ** np.array([1, 2])) % 1
     beyond = square.sum(axis=1) > 1
-    square[beyond] = 1 - square[beyond]  # the half of the square that is a triangle, for the other
+    square[beyond] = 1 - square[beyond]  # half of the square is the triangle; the other half is mirrored
     weights = np.column_stack([1 - square.sum(axis=1), square])
     triangles = _triangles(mesh)
     on = {tuple(corners): number // 4 for number, corners in enumerate(triangles.tolist())}
@@ -124,7 +123,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
 
 
 def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
-    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave by the end of the flow, straight in each tetrahedron."""
+    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave through the end of the flow, straight in each tet."""
     beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
     passed, arrives, ends = [(going, points)], np.zeros(len(points), bool), _numbers(_triangles(flux.mesh), flux.end)
     for _ in range(len(flux.mesh.tets)):  # a line passes each once

@@ -11,15 +11,15 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
 from fem_reference.geometry.distance import farthest_points
 
-# Points inside the surface from which the first centres are made, and vertices that the fit looks at.
+# Points inside the surface that give the first centres, and vertices that the fit uses.
 _INSIDE, _SAMPLES = 20_000, 1500
-# The distance of points beside the surface, over the edge of a cube of the same volume.
+# The distance of samples on both sides of the surface, over the edge of a cube of the same volume.
 _BESIDE = 0.05
-# Each round of the fit knows how fast the level falls at the samples, from the round before.
+# Rounds of the fit, each with the slopes of the level at the samples of the round before, and evaluations in each.
 _ROUNDS, _STEPS = 6, 8
 # The least and the greatest radius, over the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
-# Steps of Newton's method, and where they end: the longest, over the least radius.
+# The most steps of Newton's method, and its tolerance: the longest step over the least radius.
 _PROJECTIONS, _THERE = 12, 1e-9
 
 
@@ -56,8 +56,8 @@ class GaussianSurface:
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
     """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points beside them, robust against outliers. Deterministic; a turned or scaled surface has a turned or scaled fit up to rounding
-    where its principal axes are distinct.
+    points on both sides of them, robust against outliers. Deterministic; a turned or scaled surface has a turned or scaled fit up
+    to rounding, where its principal axes are distinct.
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")
@@ -109,7 +109,7 @@ def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
-    """Points (k, 3): vertices and those beside them on both sides; and their distances (k,) from the surface."""
+    """Points (k, 3): vertices, and points on both sides of them; and their distances (k,) from the surface."""
     some = farthest_points(surface.points, _SAMPLES)
     points, normals = surface.points[some], igl.per_vertex_normals(surface.points, surface.triangles)[some]
     sides = np.array([0.0, _BESIDE, -_BESIDE])

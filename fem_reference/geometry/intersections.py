@@ -50,8 +50,8 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 
 def overlaps(one: Floats, other: Floats) -> Floats:
-    """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shorter of the displacements across
-    either that bring the other to one side of it; 0 where either has no area.
+    """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
+    either that separates the other from its plane; 0 where either has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 
@@ -65,7 +65,7 @@ def _reach(triangles: Floats, walls: Floats) -> Floats:
 
 
 def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_]:
-    """Mask (p,) of the ``edges`` (p, 2) that pass through the triangle beside them in ``triangles`` (p, 3)."""
+    """Mask (p,) of the ``edges`` (p, 2) that pass through the triangle in the same row of ``triangles`` (p, 3)."""
     apart = (edges[:, :, None] != triangles[:, None, :]).all(axis=(1, 2))
     begin, end = (surface.points[edges[apart, side]] for side in range(2))
     a, b, c = (surface.points[triangles[apart, corner]] for corner in range(3))

@@ -1,4 +1,4 @@
-"""Tetrahedra and other arrays stored on disk, as they take long to make: written atomically, made anew where damaged."""
+"""Tetrahedra and other arrays that take long to make, stored on disk: written atomically, made anew where damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -52,7 +52,7 @@ def _arrays(mesh: TetMesh) -> Arrays:
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """The value that ``of_arrays`` reads from the file at ``path``; without one that of ``make``, stored by ``to_arrays``."""
+    """The value that ``of_arrays`` reads from the file at ``path``, else the result of ``make``, stored by ``to_arrays``."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()

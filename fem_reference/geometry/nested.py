@@ -30,8 +30,8 @@ PARTS = np.array(
 )
 # A face with corners a, b, c and points on its edges (ab, ac, bc): its four parts.
 _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
-# The position of the cut on an edge at a rim, where displacement goes with the square root of the distance. Every refinement then
-# divides the error from there by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
+# The position of the cut on an edge at a rim, near which displacement varies with the square root of the distance. Every refinement
+# then divides the error from the rim by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
 # 10.1007/s00211-005-0588-3); in a smooth part quadratic elements do better.
 GRADED = 0.25
 # A point moves towards the surface as long as the tets around it keep this share of their volume and of their quality.

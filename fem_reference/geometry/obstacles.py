@@ -7,13 +7,13 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 
-# A point this near to the middle of an obstacle, as a share of its size, leaves it by a direction that is chosen for it.
+# A point this near to the middle of an obstacle, as a share of its size, leaves it in an arbitrary direction.
 _MIDDLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along them there."""
+    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and the unit vectors (n, 3) along the paths there."""
 
     obstacles: Ints
     met: Floats
@@ -24,7 +24,7 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Quadric:
-    """An ellipsoid of semi-axes ``radii`` (3,) [mm] along its own axes, which ``pose`` (4, 4) takes to where they are.
+    """An ellipsoid of semi-axes ``radii`` (3,) [mm] along its own axes, placed by ``pose`` (4, 4).
 
     An infinite radius makes it a cylinder.
     """
@@ -53,7 +53,7 @@ class Quadric:
         return np.asarray(2 * np.vecdot(own, own))
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface along its normal, from deep inside first away from the axis."""
+        """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside away from the axis first."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -141,5 +141,5 @@ class Ring:
         return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])
 
 
-# A smooth surface where its level is 0, inside which that is negative.
+# A smooth surface on which its level is 0; inside it is negative.
 SmoothSurface = Quadric | Ring

@@ -1,4 +1,4 @@
-"""Parts of a coarse surface: its triangles and the rims between them made well-shaped, its areas and volume kept."""
+"""Attached and free parts of a coarse surface: well-shaped triangles and rims, with the areas and the volume preserved."""
 
 from dataclasses import dataclass, replace
 
@@ -86,7 +86,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 
 def collapsed(parts: Parts, short: float) -> Parts:
-    """The parts without the edges below ``short`` [mm] that end on a rim, where the surface and the rims stay what they are."""
+    """The parts without the edges below ``short`` [mm] that end on a rim, where the surface and the rims keep their shape."""
     ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]
@@ -120,7 +120,7 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True where ``goes`` may move onto ``stays``: the surface stays manifold and sharp, no triangle turns or gets the flattest."""
+    """True where ``goes`` may move onto ``stays``: surface manifold, edges sharp, no triangle turned over or the flattest."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
     if len(here & there) != 4 or len(here | there) < 6:  # the two ends and two others; more than a tetrahedron
@@ -146,9 +146,9 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """The points (n, 3) [mm] of parts that have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]: a polygon
-    in a circle is too small. In each round the rim of each part moves outwards by one distance, at most by ``most`` [mm], and all
-    points along their normals.
+    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3];
+    before, they are too small, as a polygon inscribed in a circle is. In each round the rim of each part moves outwards by one
+    distance, at most ``most`` [mm], and all points along their normals.
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)

@@ -14,8 +14,8 @@ _BERNSTEIN = np.linalg.inv(
 
 
 def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of points that go straight from ``starts`` to ``ends`` (n, 3) and meanwhile pass through the triangle beside them,
-    whose corners go straight from ``before`` to ``after`` (n, 3, 3), from the side that sees them counterclockwise.
+    """Mask (n,) of points that move straight from ``starts`` to ``ends`` (n, 3) and pass through the triangle in the same row,
+    whose corners move straight from ``before`` to ``after`` (n, 3, 3), from its front to its back.
 
     The volume between a point and a triangle is a cubic of the share of the path (Provot 1997, Collision and self-collision
     handling in cloth model dedicated to design garments); where it falls to 0 the point is in the plane.

@@ -1,6 +1,4 @@
-"""Penetration of a closed body and a bone: the depth where their surfaces cross or one is within the other, and the volume of
-the body within the bone, by random sampling.
-"""
+"""Penetration of a closed body and a bone: its depth, and the volume of the body within the bone, by random sampling."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,10 +16,10 @@ from fem_reference.geometry.boxes import around, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.geometry.skins import edge_lengths
+from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-# So many winding numbers take as long as a tree for them.
+# Points whose winding numbers take as long as building a tree for them.
 _FEW = 20
 # Sample points of a triangle that crosses another surface: those of a grid of quarters, its corners among them.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
@@ -32,8 +30,6 @@ _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
 _TOO_MANY = 1e6
 # The number of rounds of subdivision, the most cubes after each, and the most points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# The quarters of a triangle, among its corners and the middles of the edges that leave these.
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 # A triangle is sampled in parts of down to an eighth of its size.
 _PARTINGS = 3
 
@@ -43,8 +39,8 @@ Distance = Callable[[Floats], Floats]
 @dataclass(frozen=True, eq=False)
 class Depths:
     """Penetration depths (k,) [mm] of some vertices and triangles of a body and then of a bone, and their ``places`` (k, 3) [mm];
-    ``at`` are their numbers (k,), rising. All others are outside. Only triangles that cross the other surface are sampled, where
-    they are deepest.
+    ``at`` are their numbers (k,), in ascending order. All others are outside. Only triangles that cross the other surface are
+    sampled; the deepest sample counts.
     """
 
     at: Ints
@@ -78,7 +74,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_body(points: Floats) -> Floats:
         return depths_within(local, points, of_body)
 
-    tips, bone_tips = _tips(body.triangles.tobytes()), _bone_tips(bone)
+    tips, bone_tips = _tips(body.triangles.tobytes()), _tips(bone.triangles.tobytes())
     first = _of_surface(local, of_body, into_bone, tips, into_bone(local.points[tips]) > 0)
     second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(local, bone.points[bone_tips]))
     count = len(local.points) + len(local.triangles)
@@ -106,7 +102,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
 
 
 def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) that a closed ``body`` winds round; of few without a tree of its triangles."""
+    """Mask (n,) of the ``points`` (n, 3) that a closed ``body`` winds round; for few points without a tree of its triangles."""
     found, some = np.zeros(len(points), bool), _in_box(body, points)
     if len(some) > _FEW:
         found[some] = inside(body, points[some])
@@ -117,20 +113,15 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def _in_box(body: Surface, points: Floats) -> Ints:
     """The ``points`` (k,) of n within the box around the points of a ``body``."""
-    low, high = _box(body)
+    low, high = body.points.min(axis=0), body.points.max(axis=0)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-
-
-@lru_cache(maxsize=4)
-def _box(body: Surface) -> tuple[Floats, Floats]:
-    return body.points.min(axis=0), body.points.max(axis=0)
 
 
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of triangles ``crossing`` another
-    surface where they are deepest, and of vertices reached from their inside corners, or from the ``tips`` that are ``within``.
+    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of the deepest sample of triangles
+    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``.
     """
     points, corners = surface.points, surface.triangles[crossing]
     grid = np.einsum("gc,tci->tgi", _GRID, points[corners])
@@ -164,17 +155,12 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 @lru_cache(maxsize=16)
-def _bone_tips(bone: Surface) -> Ints:
-    return _tips(bone.triangles.tobytes())
-
-
-@lru_cache(maxsize=8)
 def _tips(triangles: bytes) -> Ints:
-    """A vertex of each part of a surface of ``triangles``, 64 bit integers; the side of a part without a crossing is its side."""
+    """A vertex of each part of a surface of ``triangles``, 64 bit integers, which shows the side of a part without a crossing."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
     parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
     found = np.zeros(parts.max() + 1, np.int64)
-    found[parts[::-1]] = np.arange(len(parts))[::-1]  # the last to be set: the first of each
+    found[parts[::-1]] = np.arange(len(parts))[::-1]  # reversed, so that the first of each is set last
     return np.sort(found)
 
 
@@ -188,15 +174,14 @@ class Shared(NamedTuple):
 def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
-    Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
-    these, the same every time. On average the count is exact. Its standard deviation is at most half the volume of one point,
-    times the square root of the number of points in cubes on the border of the overlap.
+    Space is cut into cubes, those that may contain a part of the overlap into smaller ones, and 4000 to 8000 random points are
+    drawn in these, the same every time. The expected volume is exact. Its standard deviation is at most half the volume of one
+    point, times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
     [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
     [mm] on all its sides: where all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
-    enters the body, and the body does not reach into the surface up to its middle. It is NaN where the surface has blown up
-    beyond a cubic metre.
+    enters the body and the middle of the body is outside the surface. It is NaN where the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
@@ -229,17 +214,14 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True where a counted triangle enters the body; tested at its vertices, and near the body at ever smaller parts."""
+    """True where a counted triangle enters the body; tested at its vertices, and near the body at those of smaller parts."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True
-        near = away.min(axis=1) < edge_lengths(corners).max(axis=1)
-        middles = (corners[near] + np.roll(corners[near], -1, axis=1)) / 2  # of the edge that leaves each corner
-        between = distance(middles.reshape(-1, 3)).reshape(-1, 3)
-        corners = np.concatenate([corners[near], middles], axis=1)[:, _QUARTERS].reshape(-1, 3, 3)
-        away = np.concatenate([away[near], between], axis=1)[:, _QUARTERS].reshape(-1, 3)
+        corners = quartered(corners[away.min(axis=1) < edge_lengths(corners).max(axis=1)])
+        away = distance(corners.reshape(-1, 3)).reshape(-1, 3)
     return bool((away < 0).any())
 
 

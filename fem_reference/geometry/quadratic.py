@@ -58,9 +58,7 @@ class Displaced:
         return areas.sum(axis=(0, 1)), np.cross(places, areas).sum(axis=(0, 1))
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None
-        where unknown.
-        """
+        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s]; None where unknown."""
         if self.by is None or self.velocity is None:
             return None
         sizes = tet_volumes(self.mesh.points, self.mesh.tets)

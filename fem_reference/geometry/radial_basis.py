@@ -32,12 +32,12 @@ class RadialSum:
 
 def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
     """The sum with these ``centres`` (m, d) whose ``values`` (n,) at ``points`` (n, d) are nearest in the mean square; as many
-    centres as points interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; no sum of weights takes its place (3.10).
+    centres as points interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
         raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
     basis = np.hstack([_gaussians(points, centres, shape), _monomials(points, terms)])
-    # Weights are orthogonal to the polynomials: they are sought in the null space of those.
+    # The weights are orthogonal to the polynomials: they are sought in the null space of the polynomials at the centres.
     flat = np.linalg.qr(_monomials(centres, terms), mode="complete").Q[:, terms:]
     free = np.hstack([basis[:, : len(centres)] @ flat, basis[:, len(centres) :]])
     found, _, _, singular = np.linalg.lstsq(free, values, rcond=None)

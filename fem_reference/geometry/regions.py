@@ -10,14 +10,14 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import FibreField
 from fem_reference.geometry.signed_distance import signed_distances
 
-# From points (n, 3) [mm] at rest to their shares (n,), from 0 to 1; and to their depths (n,) [mm] below a border. Picklable.
+# Functions of points (n, 3) [mm] at rest: their shares (n,), from 0 to 1, and their depths (n,) [mm] below a border. Picklable.
 Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
-# The factor by which the share rises over the width, from its first part on.
+# The ratio of the slopes of the share at the depth of the width and at the border.
 _RISE = 1000.0
-# Points at the border of a cell are asked for this share of the way to its middle: they are in the regions that the cell is in.
+# Points at the border of a cell are moved by this share of the path to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
-# Sample points of a body: about as many, whatever its size.
+# The number of sample points of a body, about, independent of its size.
 _SAMPLES = 20_000
 
 
@@ -26,9 +26,9 @@ class Blended:
     """The region of depth above 0: by ``(1000^t - 1) / 999``, t from 0 to 1, from a share of 0 at the border to 1 at a depth of
     ``width`` [mm].
 
-    So the stiffness goes from that of the body to the thousandfold by the same factor in each part of the width, and elements that
-    resolve the width converge; by ``3 t^2 - 2 t^3`` most of it would be in a fiftieth of the width. The stiffer of two materials
-    is therefore best the region, and the softer the rest. In series, a part of 0.14 of the width counts as soft.
+    In a region a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the width, and
+    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. So the
+    stiffer of two materials should be the region, the softer the rest. In series, a part of 0.14 of the width counts as soft.
     """
 
     depth: Depth
@@ -98,7 +98,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """Points (n, 3) [mm] inside a closed ``surface``, those of a regular grid, about 20,000: each stands for the same volume."""
+    """Points (n, 3) [mm] inside a closed ``surface``, about 20,000 of a regular grid, each for the same volume."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

@@ -68,19 +68,15 @@ class Exact:
 
 @dataclass(frozen=True)
 class HalfSpace(Exact):
-    """The half-space behind the plane through ``point`` [mm] across the outward ``normal``, of any length."""
+    """The half-space behind the plane through ``point`` [mm] with the outward ``normal``, of any length."""
 
+    half_thickness: ClassVar[float] = np.inf
     point: Vector
     normal: Vector
 
     def __post_init__(self) -> None:
         if not np.linalg.norm(self.normal) > 0:
             raise InputError("half space: normal", self.normal, "a direction")
-
-    @property
-    def half_thickness(self) -> float:
-        """Infinite."""
-        return np.inf
 
     def sample(self, points: Floats) -> Sampled:
         """``(x - point) . normal``."""
@@ -218,7 +214,7 @@ def _orthant(beyond: Floats) -> Sampled:
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (some axis for a zero), and their squares (n, d, d)."""
+    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for a zero), and their squares (n, d, d)."""
     length = np.linalg.norm(vectors, axis=1)
     some = np.eye(vectors.shape[1])[-1]
     unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])

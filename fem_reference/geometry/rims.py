@@ -16,13 +16,13 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 Bools = NDArray[np.bool_]
 
-# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle. More rounds off corners.
+# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle; longer, it rounds corners.
 _SMOOTHED = 0.1
 # A vertex nearer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers stay.
 _NEAR = 0.3
 # A fixed vertex nearer than this counts as on the rim.
 _THERE = 0.2
-# An edge over a piece of an attachment, or a gap in it, is cut where these are wider than this share of it.
+# An edge over a piece of an attachment, or over a gap in it, is cut where that is wider than this share of the edge.
 _NARROW = 0.3
 _REFINED = 2  # rounds of search for narrow pieces and gaps
 _ISLAND = 0.1  # squares of the size: the least area of an island of an attachment that is kept
@@ -77,7 +77,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """The parts with a new point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
+    """The parts with a new point in the middle of each island of an attachment of ``least`` [mm2] or more without a point."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
@@ -125,9 +125,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts with edges cut that pass over a narrow piece of an attachment or a gap in it: edges that, in between, are on the
-    other side of the level of a half for much of their length.
-    """
+    """The parts with edges cut that are on the other side of the level 1/2 for much of their length, but not at their ends."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]

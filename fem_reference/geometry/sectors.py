@@ -21,8 +21,8 @@ def sectors(surface: Surface) -> Ints:
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
     """The attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for attached ``vertices`` (k,).
 
-    A vertex on a sharp edge attaches only those sides of the edge on which it attaches a whole triangle, if there is one: the end
-    of a muscle, but not a strip of arbitrary width of the belly around it.
+    A vertex on a sharp edge attaches only the sides of the edge with a whole attached triangle at the vertex, if there is one: the
+    end of a muscle, but not a strip of arbitrary width of the belly around it.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True
@@ -42,8 +42,6 @@ def attached_area(surface: Surface, shares: Floats) -> float:
 
 
 def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
-    """The attached shares (n,), from 0 to 1, at the points of a ``surface`` that are nearest to ``points`` (n, 3) [mm], by the
-    ``shares`` (m, 3) of the corners of its triangles.
-    """
+    """The attached shares (n,) at the nearest points of a ``surface`` to ``points`` (n, 3) [mm], by corner ``shares`` (m, 3)."""
     nearest = distances(points, surface)
     return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))

@@ -38,12 +38,12 @@ MOST_NODES = 2**24
 _FIRST_CELLS = 24
 # The distance is exact for this many cells beyond the margin: the influence of an error falls by 73 % per cell of a spline.
 _FORGETTING = 4
-# One of so many nodes along an axis is exact everywhere; the others only near the surface.
+# Every fourth node along an axis is exact everywhere; the others only near the surface.
 _STRIDE = 4
 # Random points around the surface at which the error is sampled, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
-# So many points are sampled at a time.
+# Points that are sampled at a time.
 _AT_ONCE = 10_000
 # Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
@@ -112,9 +112,7 @@ class Grid:
             yield chunk, at[chunk]
 
     def _values(self, at: Floats, orders: int) -> Floats:
-        """The value and the derivatives below so many ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at places
-        (n, 3) in cells from the origin.
-        """
+        """The derivatives below ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at places (n, 3) in cells."""
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
         x, y, z = (_weights(at[:, axis] - cell[:, axis], orders) for axis in range(3))
@@ -135,9 +133,7 @@ class Grid:
 
 
 def _weights(within: Floats, orders: int) -> Floats:
-    """Value and derivatives below so many ``orders`` of the four B-splines of a cell at ``within`` (n,), from 0 to 1 across it:
-    (n, orders, 4).
-    """
+    """The value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell ``within`` (n,) it, 0 to 1."""
     one, none = np.ones_like(within), np.zeros_like(within)
     found = [np.stack([one, within, within**2, within**3], axis=1)]
     if orders > 1:
@@ -222,17 +218,14 @@ def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: fl
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
     stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
     values: Floats = scipy.ndimage.zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
-    # The error of trilinear values is at most half the diagonal of a coarse cell: a distance changes no faster than its point.
+    # The error of trilinear values is at most half the diagonal of a coarse cell: the gradient of a distance has length 1.
     near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
     values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
     return values
 
 
 def _coefficients(values: Floats) -> Floats:
-    """The coefficients of the B-splines through ``values`` (i, j, k), with one more on each side.
-
-    The values continue beyond the border by reflection in their border value, which leaves no bend there.
-    """
+    """Coefficients of the B-splines through ``values`` (i, j, k) and one more on each side, by odd reflection at the border."""
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
     return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corner_areas, diagonal
 from fem_reference.geometry.embedding import Locator
 
-# A triangle is thin if the square of its longest edge is more than so many times its area: for half a square the ratio is 4.
+# A triangle is thin if the square of its longest edge is more than this many times its area: for half a square the ratio is 4.
 _THIN = 5.0
 # A triangle cut in four: the barycentric coordinates (3, 3) of the corners of each part.
 _QUARTERS = np.array(

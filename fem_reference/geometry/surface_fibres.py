@@ -1,6 +1,4 @@
-"""Fibres inside a muscle by centripetal Catmull-Rom splines between fibres on its surface: the decomposition of Kohout and Cholt,
-CHMD (report 6.1.2), head by head.
-"""
+"""Fibres inside a muscle by Catmull-Rom splines between fibres on its surface: CHMD of Kohout and Cholt (report 6.1.2)."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -12,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
-_THIN = 1e-6  # lines whose section is thinner than this, squared over its width, are on one surface
+_THIN = 1e-6  # the squared thickness of a section over its squared width below which its lines are on one surface
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # from seed to seed of a sunflower [rad]
 
 

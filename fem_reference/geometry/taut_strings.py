@@ -13,7 +13,7 @@ Flags = NDArray[np.bool_]
 
 # Pieces of a string, sweeps over it, and their factor of overrelaxation: 1 takes a point to the middle of its neighbours.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
-# Where a string needs more points than this, so that no piece slips past a thin tube, it is not followed further.
+# The most points of a string; a very thin tube would need more, so that no piece of the string slips past it.
 MOST = 10_000
 
 

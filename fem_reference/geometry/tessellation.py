@@ -38,12 +38,12 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
         case Cylinder():
             points, triangles = _prism(solid, turn)
         case _:
-            raise TypeError(f"{type(solid).__name__} has no closed form that is known here")
+            raise TypeError(f"{type(solid).__name__} is not a body of closed form")
     return Surface(points, triangles, place)
 
 
 def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
-    """A square in the plane under the middle of ``beside``, with a slab behind it."""
+    """A slab behind a square in the plane, under the middle of the points ``beside``."""
     middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
     size = diagonal(beside)
     frame = _frame(np.asarray(half_space.normal, float))

@@ -36,15 +36,15 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
 _VOLUME_WITHIN = 0.05  # no closer, as the volume of a surface that passes through itself is not well defined
-_MOST_TETS = 3e6  # some GB and minutes, far above what a solver takes
+_MOST_TETS = 3e6  # some GB and minutes, far more than a solver can use
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
     """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. By gmsh they have ``facets``
-    by attachment, whose ``shares`` (m, 3) state how much of the corners of triangles is attached; their ``maker`` says who made
-    them. InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
+    by attachment, whose ``shares`` (m, 3) are the attached shares of the corners of triangles; ``maker`` names the mesher.
+    InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
 
     A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that does
     not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it moves with
@@ -55,7 +55,7 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
     check_size(surface.moved_to(local), size)
     crossing = len(self_intersections(surface))
     if crossing:
-        log.warning("%s: %d triangles of the given surface pass through it", surface.place, crossing)
+        log.warning("%s: %d triangles of the given surface intersect others", surface.place, crossing)
     mesh = _mesh(surface.moved_to(local), size, shares or {})
     return TetMesh(mesh.points @ axes.T + origin, mesh.tets, mesh.facets, mesh.maker)
 
@@ -75,10 +75,7 @@ def check_size(surface: Surface, size: float) -> None:
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
-    """Origin (3,) and axes in columns (3, 3) of the frame that the points span.
-
-    From point 0 to the point farthest from it, and from that line to the farthest from it; of equally far ones to the first.
-    """
+    """Origin (3,) and axes in columns (3, 3): from point 0 to the farthest, then to the farthest from that line."""
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]
     first = first / np.linalg.norm(first)
@@ -144,7 +141,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
-        got = f"a part that is lost ({lost:.1f} mm off) where triangles have a side of {size:g} mm"
+        got = f"a part that is lost ({lost:.1f} mm off) with triangles of {size:g} mm"
         raise InputError(surface.place, got, "smaller tetrahedra")
     return coarse
 
@@ -177,10 +174,10 @@ def run(mesher: str, surface: Surface, size: float) -> TetMesh:
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:
-    """The reason why a process failed: the signal that ended it, or its last line of output."""
+    """The reason for the failure of a process: the signal that ended it, or its last line of output."""
     if done.returncode < 0:
         return f"it crashed with signal {-done.returncode}"
-    return (done.stderr.strip().splitlines() or ["without a word"])[-1]
+    return (done.stderr.strip().splitlines() or ["no message"])[-1]
 
 
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
@@ -204,7 +201,6 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
 
 
 def _largest_part(tets: Ints, place: str) -> Ints:
-    """The tets of the largest part connected by triangles."""
     faces = np.sort(tets[:, TET_FACES].reshape(-1, 3), axis=1)
     _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
     if sides.max() > 2:

@@ -1,8 +1,8 @@
-"""The shortest paths around several smooth obstacles: straight and geodesic by turns, without a kink between them.
+"""The shortest paths around several smooth obstacles: straight pieces and geodesics, alternately, without a kink between them.
 
 A taut string finds the obstacles that a path meets, and nearly where; Newton's method then finds the point, direction and length
 of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219,
-DOI 10.1007/s11044-015-9451-1). A path is the shortest near the straight one, and meets an obstacle once at most.
+DOI 10.1007/s11044-015-9451-1). A path is the shortest near the straight one, and meets an obstacle at most once.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, me
 _STEPS = 60
 # Newton's iterations, their end [of the distance between the ends] and the step of their finite differences.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
-# So many points of a path are looked at for whether it crosses an obstacle, beside the deepest of its chords.
+# Points of a path at which it is checked for crossing an obstacle, besides the deepest points of its chords.
 _CHECKED = 200
 
 
@@ -26,8 +26,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
 
-    In turn they follow the obstacles ``met`` (n, m), each over as many knots; where there are less than m, all knots left are at
-    the end. ``failed`` (n,): not found by Newton's method.
+    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; where there are fewer than m, all other
+    knots are at the end. ``failed`` (n,): Newton's method found no path.
     """
 
     knots: Floats
@@ -95,7 +95,9 @@ class Winding:
 
 @dataclass(eq=False)
 class _Pieces:
-    """Geodesics on the m ``obstacles`` that n paths meet in turn: where they begin, along what (m, n, 3), how long (m, n)."""
+    """Geodesics on the m ``obstacles`` that n paths meet in turn: their first ``points``, their directions ``along`` there, both
+    (m, n, 3), and their lengths ``sizes`` (m, n) [mm].
+    """
 
     obstacles: list[SmoothSurface]
     starts: Floats
@@ -127,7 +129,7 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts[which], self.ends[which], *parts)
 
     def pressed(self) -> Flags:
-        """True (m, n) where a path lies on an obstacle by its tension: where the surface is convex along it, in the middle."""
+        """True (m, n) where tension presses a path onto an obstacle: the surface is convex along the middle of the geodesic."""
         middles = [(points[_STEPS // 2], tangents[_STEPS // 2]) for points, tangents in self.run()]
         return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
 
@@ -148,9 +150,9 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts, self.ends, np.array(points), np.array(along), np.array(sizes))
 
 
-@np.errstate(all="ignore")  # what is not a number counts as failed
+@np.errstate(all="ignore")  # NaN counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which have none of both inside."""
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, outside which both are."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
     found = Winding.straight(len(obstacles), starts, ends)
@@ -174,7 +176,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
 
 
 def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
-    """The paths (n,) that cross an obstacle or are longer than the string, but for what its chords cut off."""
+    """Mask (n,) of the paths that cross an obstacle, or are longer than the string by more than 2 %, the error of its chords."""
     count = len(string)
     even = np.broadcast_to(np.linspace(0, 1, _CHECKED), (count, _CHECKED))
     shares = np.stack([*even.T, *(_deepest(one, found) for one in obstacles if isinstance(one, Quadric))], axis=1)
@@ -219,14 +221,14 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
     for _ in range(_ITERATIONS):
-        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # also what is not a number
+        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # NaN too
         if not left.any():
             return pieces, np.ones(len(near), dtype=bool)
         part, kinks, todo = part.rows(np.flatnonzero(left)), kinks[left], todo[left]
         count, size = kinks.shape
         every = part.rows(np.tile(np.arange(count), size)).moved(_STEP * np.repeat(np.eye(size), count, axis=0))
         slopes = (every.kinks().reshape(size, count, size) - kinks).transpose(1, 2, 0) / _STEP
-        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # which no change mends
+        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # these paths stay as they are, and fail
         change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
         change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
         part, kinks = _better(part, change, np.linalg.norm(kinks, axis=1))
@@ -235,9 +237,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
 
 
 def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, Floats]:
-    """The geodesics after a ``change`` (n, 4 m) that is halved where kinks, of size ``before`` (n,) [mm], would not become smaller;
-    and their kinks.
-    """
+    """The geodesics after a ``change`` (n, 4 m), halved where kinks, ``before`` (n,) [mm], would not fall; and their kinks."""
     for _ in range(5):
         tried = pieces.moved(change)
         kinks = tried.kinks()
@@ -270,7 +270,7 @@ def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Flo
 
 
 def _tangent(directions: Floats, slopes: Floats) -> Floats:
-    """Unit vectors (n, 3) along the ``directions`` but for their parts along the ``slopes``."""
+    """Unit vectors (n, 3) along the parts of the ``directions`` perpendicular to the ``slopes``."""
     normals = _units(slopes)
     return _units(directions - np.vecdot(directions, normals)[:, None] * normals)
 

@@ -16,7 +16,7 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface; a straight path is all before it.
+    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface; a straight path is wholly before it.
 
     ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along it a path turns
     by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
@@ -36,7 +36,7 @@ class Paths:
         return np.zeros(len(self.parts), dtype=bool)
 
     def touching(self) -> list[Touch]:
-        """The one obstacle, as if met at the starts and left at the ends: what lies between pulls along the same lines."""
+        """The one obstacle, as if met at the starts and left at the ends: the resultant on it is the same."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 

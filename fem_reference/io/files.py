@@ -1,6 +1,6 @@
 """Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
 
-A reader keeps the points of its file as they are: their order, their number, and float64 where the file has it.
+A reader keeps the order, the number and, where the file has it, the double precision of the points.
 """
 
 import csv
@@ -21,29 +21,23 @@ from fem_reference.foundations.subprocesses import lives
 from fem_reference.io import soup, xdmf
 from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
-from fem_reference.io.soup import Lines
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The most bytes of a mesh, a table or an index: a million triangles, which no mesher and no solver of ours takes. What is read
-# of a text takes up to thirty times as much.
+# The most bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The values of a
+# text take up to thirty times as much memory.
 MOST_BYTES = 2**26
-# So old [s] is what a process left half-written that is not there: it may have been one of another machine.
+# The age [s] above which a half-written file is removed whose process does not run here: it may run on another machine.
 _SETTLED = 10.0
 
 
-def surface_suffixes() -> tuple[str, ...]:
-    """The suffixes of the files that ``read_surface`` reads."""
-    return tuple(formats())
-
-
 def shares_points(place: str) -> bool:
-    """True where triangles read from ``place`` have points in common, in the order of the file; else each has three of its own."""
+    """True where triangles read from ``place`` share points, in the order of the file; False where each has three own points."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
 
 def _format(path: Path, want: str, known: Collection[str]) -> Format:
-    """The format of a file by its suffix, one of ``known``; InputError that says what is wanted."""
+    """The format of a file by its suffix, one of ``known``; InputError with ``want`` for any other."""
     suffix = path.suffix.lower()
     if suffix not in known:
         raise InputError(path, f'the suffix "{path.suffix}"', want)
@@ -88,23 +82,15 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
     return Surface(points * unit, triangles, str(path))
 
 
-def read_polylines(path: Path, unit: float) -> Polylines:
-    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that go on where another ends are one line.
+def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines:
+    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that begin where another ends are joined to it.
 
-    InputError where it cannot be read whole, a point is not finite or a line has no length.
+    InputError where it cannot be read whole. ``moved`` states that the lines are those of a moved state; otherwise it is an error
+    too if a point is not finite or a line has no length.
     """
-    return _polylines(path, unit, soup.check_lengths)
-
-
-def read_moved_polylines(path: Path, unit: float) -> Polylines:
-    """Lines of a moved state, read as by ``read_polylines``; points that are not finite and lines without length are accepted."""
-    return _polylines(path, unit, lambda lines: lines)
-
-
-def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Polylines:
     want = f"polylines, whole, as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
-    points, lines = _attempt(lambda file: checked(vtk.read_lines(file)), path, want)
+    points, lines = _attempt(lambda file: vtk.read_lines(file, moved=moved), path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
 
@@ -148,9 +134,7 @@ def read_rows(path: Path) -> list[list[str]]:
 
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
-    """The surface with its points at ``positions`` (n, 3) [mm] in the format of the suffix; in VTK's with point data
-    ``displacement`` [mm], float64.
-    """
+    """The surface with its points at ``positions`` (n, 3) [mm]; in VTK's formats with point data ``displacement`` [mm], float64."""
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
     assert write is not None  # of a suffix that is written
@@ -205,8 +189,8 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A name beside ``path`` to write to, which takes its place when all went well and is gone otherwise. An OSError names ``path``
-    and, where that is why, how much room there is.
+    """A file beside ``path`` to write to, which replaces it on success and is removed otherwise. An OSError names ``path`` and the
+    free space, where the disk is full.
     """
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
@@ -221,7 +205,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def make_folder(path: Path) -> None:
-    """The folder ``path``, with those above it, where it is not there. An OSError says that it cannot be written, and why."""
+    """Create the folder ``path`` and those above it where they do not exist; an OSError names ``path`` and the reason."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -229,18 +213,18 @@ def make_folder(path: Path) -> None:
 
 
 def _unwritten(path: Path, error: OSError) -> OSError:
-    """The error that says in a sentence why ``path``, a file or a folder, could not be written."""
+    """The error for a ``path``, a file or a folder, that could not be written, with the reason as a sentence."""
     why = error.strerror or str(error)
-    if error.errno in (None, *NO_ROOM):  # numpy does not say why
+    if error.errno in (None, *NO_ROOM):  # numpy's errors have no number
         free = shutil.disk_usage(path.parent).free
-        why += f"; {free / 2**20:.3g} MB are free there. What was there before is as it was, and what is done goes on from it"
+        why += f"; {free / 2**20:.3g} MB are free there. Existing files are unchanged; finished work is kept and can be continued"
     found = OSError(f"{path}: cannot be written: {why}")
     found.errno = error.errno
     return found
 
 
 def clear(path: Path) -> None:
-    """Remove what killed processes have left of ``path``, a file or a folder."""
+    """Remove half-written copies of ``path``, a file or a folder, that killed processes have left."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
         process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
         with suppress(OSError):
@@ -249,7 +233,7 @@ def clear(path: Path) -> None:
 
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
-    """The result of ``read`` for a file; whatever a reader raises over a damaged file becomes an InputError."""
+    """The result of ``read`` for a file; any error that a damaged file causes becomes an InputError."""
     if not is_file(path):
         raise InputError(path, "no file", want)
     check_size(path, MOST_BYTES, want)
@@ -257,5 +241,5 @@ def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
         return read(path)
     except MemoryError as error:
         raise InputError(path, "more than fits into memory", want) from error
-    except Exception as error:  # the readers of foreign packages raise whatever occurs to them
+    except Exception as error:  # the readers of other packages raise errors of any type
         raise InputError(path, str(error) or type(error).__name__, want) from error

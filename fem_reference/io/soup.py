@@ -9,11 +9,10 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints
 
 Soup = tuple[Any, Any]
-Lines = tuple[Floats, list[list[int]]]
 
 
 def arrays(soup: Soup) -> tuple[Floats, Ints]:
-    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError where they are none."""
+    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError where ``soup`` has no such shapes."""
     points, corners = (np.asarray(values) for values in soup)
     if len(corners) == 0:
         raise ValueError("no triangles")
@@ -21,27 +20,25 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
         raise ValueError("no vertices")
     if points.shape != (len(points), 3):
         raise ValueError(f"points of shape {points.shape}")
-    with np.errstate(invalid="ignore"):  # not a number becomes another one, and is found below
+    with np.errstate(invalid="ignore"):  # NaN becomes an integer; the comparison below finds it
         triangles = np.asarray(soup[1], np.int64)
     if triangles.shape != (len(triangles), 3) or (triangles != corners).any():
         raise ValueError(f"corners of shape {corners.shape} that are not three point numbers each")
     return points.astype(np.float64), triangles
 
 
-def check_lengths(read: Lines) -> Lines:
-    """The points (n, 3) and lines that were ``read``; ValueError where a point is not finite or a line has no length."""
-    points, lines = read
+def check_lengths(points: Floats, lines: list[list[int]]) -> None:
+    """ValueError where one of ``points`` (n, 3) is not finite or one of the ``lines`` between them has no length."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise ValueError(f"a point that is not finite (point {bad[0]})")
     for number, line in enumerate(lines):
         if (points[line] == points[line[0]]).all():
             raise ValueError(f"line {number} of zero length")
-    return read
 
 
 def joined(cells: list[list[int]]) -> list[list[int]]:
-    """Lines of point numbers; a cell that begins where one other ends goes on from there."""
+    """Lines of point numbers, in which a cell that begins where exactly one other ends is joined to that."""
     starts, ends = Counter(cell[0] for cell in cells), Counter(cell[-1] for cell in cells)
     shared = {point for point in starts if starts[point] == ends[point] == 1}
     after = {cell[0]: cell for cell in cells}
@@ -63,19 +60,19 @@ def only_triangles(corners: set[int]) -> None:
 
 
 def positions(rows: list[list[float]]) -> Any:
-    """Points (n, 3) of as many ``rows``; ValueError where one has fewer coordinates."""
+    """Points (n, 3) from n ``rows``; ValueError where one has fewer coordinates."""
     if any(len(row) != 3 for row in rows):
         raise ValueError("a position of fewer than three coordinates")
     return np.array(rows)
 
 
 def rows(points: Floats) -> list[str]:
-    """One text a point (n, 3), in as many digits as bring the same float back."""
+    """One text for each of ``points`` (n, 3), with the digits from which the same floats are read."""
     return [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist()]
 
 
 def of_meshio(points: Any, blocks: Any) -> Soup:
-    """Points and triangles from the cell ``blocks`` of meshio; points and lines are passed over."""
+    """Points and triangles from the cell ``blocks`` of meshio; points and lines are skipped."""
     if other := {block.type for block in blocks} - {"triangle", "line", "vertex"}:
         raise ValueError(f"cells of type {', '.join(sorted(other))}")
     triangles = [block.data for block in blocks if block.type == "triangle"]
@@ -83,15 +80,15 @@ def of_meshio(points: Any, blocks: Any) -> Soup:
 
 
 class PointLists(NamedTuple):
-    """Cells as lists of points: ``sizes`` (m,), and the points of all, one after the other, in ``corners``."""
+    """Cells as lists of points: ``sizes`` (m,), and the points of all cells in sequence, ``corners``."""
 
     sizes: Ints
     corners: Ints
 
 
 class DataSet(NamedTuple):
-    """A data set of a ``kind``, ``PolyData`` or ``UnstructuredGrid``: ``points`` (n, 3), ``cells`` by the name that XML files give
-    them, and the ``types`` (m,) of those of a grid.
+    """A data set of a ``kind``, ``PolyData`` or ``UnstructuredGrid``: ``points`` (n, 3), ``cells`` by their names in XML files, and
+    the ``types`` (m,) of the cells of a grid.
     """
 
     kind: str
@@ -112,7 +109,7 @@ def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
 
 
 def whole_number(text: str, name: str) -> int:
-    """The number that a text states; ValueError with its ``name`` where it is none of 1 to 18 digits."""
+    """The number that a text states; ValueError with its ``name`` where the text is not 1 to 18 digits."""
     if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
         raise ValueError(f'{name} of "{text[:40]}"')
     return int(text)

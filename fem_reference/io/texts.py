@@ -1,4 +1,4 @@
-"""TOML, JSON and XML from files that anybody may have written: bounded in size and depth, so that reading them ends.
+"""TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading them ends.
 
 A file is refused if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
@@ -18,10 +18,10 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# How large files may be [bytes]. A case file has some kB, a baseline 1.3 kB a frame; its content takes up to thirty times as much.
+# The most bytes of a file. A case file has some kB, a baseline 1.3 kB a frame; its content takes up to thirty times as much memory.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# How deep tables and lists may be nested; case files go to 6.
+# The most levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
 # A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
@@ -55,7 +55,7 @@ def toml_text(text: str) -> str:
 
 
 def read_json(path: Path, want: str) -> Any:
-    """The value of a JSON file; InputError with ``want`` for any other file, also for one with NaN or Infinity."""
+    """The value of a JSON file; InputError with ``want`` for any other file, and for one with NaN or Infinity."""
     return _parsed(partial(json.loads, parse_constant=_no_number), _text(path, MOST_JSON, want), path, want)
 
 
@@ -73,7 +73,7 @@ def check_no_entities(text: bytes) -> None:
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` that the file at ``path`` refers to; ValueError where that, links followed, is not in its folder."""
+    """The file ``name`` that the file at ``path`` refers to; ValueError where it is outside the folder, after following links."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
@@ -133,7 +133,7 @@ def _no_number(name: str) -> float:
 
 
 def _parsed(loads: Callable[[str], Any], text: str, place: object, want: str) -> Any:
-    """The value that ``loads`` reads from a text; InputError where it reads none, or one that is nested too deep."""
+    """The value that ``loads`` reads from a text; InputError where it fails, or where the value is nested too deeply."""
     try:
         value = loads(text)
         level = [value]

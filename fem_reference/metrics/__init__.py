@@ -6,7 +6,6 @@ and the standard that it is measured ``AGAINST``: the reference (or the rest sta
 """
 
 import importlib
-import pkgutil
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -14,6 +13,7 @@ from typing import Any, Literal, Protocol, cast, overload
 
 import numpy as np
 
+from fem_reference.foundations import modules
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
@@ -37,8 +37,8 @@ class Statistic:
     ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
     ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
     position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
-    for the value of a single fibre, or of the force on a bone: nothing averages there; ``pooled``: True where the statistics of its
-    metric are of one field in one unit, so that a difference of one that is small by chance counts as that of all.
+    for the value of a single fibre, or of the force on a bone, which is no mean; ``pooled``: True where the statistics of its
+    metric are of one field in one unit, so that a difference that is small in one by chance is replaced by that of all.
     """
 
     unit: str
@@ -65,8 +65,8 @@ class Statistic:
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 where not given; the
-    place ``where`` (f,) each is worst, in words; ``error_bars`` (f,) of the reference, None where it has none.
+    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 where not given;
+    ``where`` (f,): the worst place at each frame, in words; ``error_bars`` (f,) of the reference, None where it has none.
     """
 
     metric: str
@@ -79,7 +79,7 @@ class Measure:
 
     @property
     def worst(self) -> "Worst":
-        """The frame with the greatest magnitude; a value that is not a number counts as the greatest."""
+        """The frame with the greatest magnitude; NaN counts as the greatest."""
         return self._at(np.where(np.isnan(self.values), np.inf, np.abs(self.values)))
 
     @property
@@ -199,8 +199,7 @@ def metric(name: str) -> Metric:
 
 def names(against: Collection[Standard] | None = None) -> list[str]:
     """The names of all metrics, or of those measured ``against`` one of these standards."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return [name for name in found if against is None or metric(name).AGAINST in against]
+    return [name for name in modules.names(__path__) if against is None or metric(name).AGAINST in against]
 
 
 @cache
@@ -265,15 +264,15 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """Every statistic of the change from rest of a ``run`` of the reference's solver, on its own fibres: where overlaps with bones
-    are removed first, the fibres of two runs begin in different places, and the surface would carry them instead.
+    """Every statistic of the change from rest of a ``run`` of the reference's solver, on its own fibres. Where overlaps with bones
+    are removed first, the fibres of two runs differ at rest; on those of another run, they would be carried by the surface.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
 
 
 def as_surface(run: Run) -> Run:
-    """The run without an interior: its surface carries the fibres that are measured, as that of a candidate does."""
+    """The run without an interior: its surface carries the measured fibres, like that of a candidate."""
     return replace(run, fibres=None, fibre_positions=None)
 
 
@@ -289,7 +288,7 @@ def rms(deviations: Floats, weights: Floats) -> Floats:
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The least of ``values`` (n,) that ``share`` of the weight does not exceed; NaN where one is not finite."""
+    """The least of ``values`` (n,) that a ``share`` of the weight does not exceed; NaN where one is not finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

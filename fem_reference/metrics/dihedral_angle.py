@@ -28,8 +28,8 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     more convex), the ``rms``, and of the magnitude the mean ``mean_magnitude``, the 95th percentile ``p95`` and
     the greatest ``max``.
 
-    An edge weighs as the area around it at rest, a third of its two triangles. ``mean_magnitude_of_edges`` has every edge
-    alike, as the report plots it. NaN in a frame where a triangle has collapsed: it has no angle.
+    An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_magnitude_of_edges`` all edges have
+    the same weight, as in the report. NaN in a frame where a triangle has collapsed: it has no angle.
     """
     edges = Edges.of(reference.surface)
     angles, wanted = (np.array([edges.angles(points) for points in each.positions]) for each in (run, reference))

@@ -25,8 +25,8 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean``, the ``rms``, and
     of the magnitude the 95th percentile ``p95`` and the greatest ``max``.
 
-    An edge weighs as the area around it at rest, a third of its two triangles. ``mean_of_edges`` is the mean with every
-    edge alike, as the report plots it.
+    An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_of_edges`` all edges have the same
+    weight, as in the report.
     """
     edges = Edges.of(reference.surface)
     lengths, wanted = (np.array([edges.lengths(points) for points in each.positions]) for each in (run, reference))

@@ -1,9 +1,8 @@
-"""Distances of the ends of fibres from where their bones take them; of the run alone, independent of the reference.
+"""Distances of the ends of fibres from their places on the moving bones; of the run alone, independent of the reference.
 
-An end of a fibre at an attachment moves with its bone. Where fibres end beside the attached area, as given ones may, the muscle
-leaves them behind, and their lengths and moment arms are not those of fibres that reach the bone. A run without fibres is measured
-on points that its surface carries. The attachment of an end is that of
-:func:`fem_reference.problems.fibre_ends.attached_ends`.
+An end of a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area; they do not follow the
+bone, and their lengths and moment arms are not those of fibres that reach it. A run without fibres is measured on points that its
+surface carries. The attachment of an end is that of :func:`fem_reference.problems.fibre_ends.attached_ends`.
 """
 
 import numpy as np
@@ -25,8 +24,8 @@ OF, AGAINST = "lines", "itself"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the place of an end less that to which the
-    pose of its bone takes its rest position, also where a tendon continues to the bone. Nothing where the muscle is not attached.
+    """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the position of an end less its rest
+    position moved by the pose of its bone, also where a tendon continues to the bone. No measures for an unattached muscle.
     """
     if context.ends is None:
         return ()

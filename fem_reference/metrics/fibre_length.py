@@ -1,10 +1,10 @@
 """Lengths of the fibres of a run against those of the reference, frame by frame.
 
-Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of both
-go through the measurement context's extension, so that like is compared with like. Fibres that go on beyond the muscle by straight
-tendons are as long as both. A run of lines alone (a line of action) has its
-own points in place of the fibres'. Its whole length is compared, so it deviates at rest already where a straight line is shorter
-than the fibre. That counts as its error, even if its change of length from rest is correct.
+Two runs that both carry the fibres of the measurement context inside themselves are measured on those. Otherwise the surfaces of
+both carry them by the extension of the measurement context, so that both are measured alike. The length of a fibre includes its
+straight tendon, if it has one. A run of lines alone (a line of action) has its own points in place of the fibres'. Its whole length
+is compared, so it deviates at rest already where a straight line is shorter than the fibre. That counts as its error, even if its
+change of length from rest is correct.
 """
 
 from functools import partial
@@ -34,7 +34,7 @@ STATISTICS = {
 OF, AGAINST = "lines", "reference"
 # Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
 _SAME = 1e-3
-# And where a run has its lines alone: a reference whose overlaps with bones were removed begins that far from the rest state.
+# The same for a run of lines alone: a reference whose overlaps with bones were removed begins up to so far from the rest state.
 _RELAXED = 5.0
 
 
@@ -50,9 +50,9 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def both_lengths(run: Run, reference: Run, context: MeasurementContext) -> tuple[Floats, Floats]:
-    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured alike."""
-    lengths = _direct if _carries(run, context) and _carries(reference, context) else _extended
-    return lengths(run, context), lengths(reference, context)
+    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured in the same way."""
+    inside = _carries(run, context) and _carries(reference, context)
+    return _lengths(run, context, inside=inside), _lengths(reference, context, inside=inside)
 
 
 def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:
@@ -77,7 +77,7 @@ def extension_error(reference: Run, context: MeasurementContext) -> Measure:
     The error is L by extension less L inside; NaN where the reference does not carry the measurement context's fibres.
     """
     if _carries(reference, context):
-        errors = _extended(reference, context) - _direct(reference, context)
+        errors = _lengths(reference, context, inside=False) - _lengths(reference, context, inside=True)
     else:
         errors = np.full((len(reference.positions), len(context.fibres)), np.nan)
     worst = np.abs(errors).max(axis=1)
@@ -93,21 +93,14 @@ def _carries(run: Run, context: MeasurementContext) -> bool:
     return same_lines and np.allclose(run.fibres.points, context.fibres.points, rtol=0, atol=within)
 
 
-def _direct(run: Run, context: MeasurementContext) -> Floats:
-    """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points."""
-    assert run.fibre_positions is not None  # the caller asked _carries
-    return np.array([lengths_at(*at, context) for at in zip(run.fibre_positions, _bones_at(run), strict=True)])
-
-
-def _extended(run: Run, context: MeasurementContext) -> Floats:
-    """Length of each fibre in each frame (f, k) [mm], on points that the surface carries along."""
-    carried = map(context.extension.apply, run.positions)
-    return np.array([lengths_at(*at, context) for at in zip(carried, _bones_at(run), strict=True)])
-
-
-def _bones_at(run: Run) -> tuple[int, ...]:
-    """The frame number by frame at which bones are where the ``run`` has them: the first for the rest state."""
-    return run.numbers[:1] * len(run.numbers) if run.solver == "rest" else run.numbers
+def _lengths(run: Run, context: MeasurementContext, *, inside: bool) -> Floats:
+    """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points ``inside``, or on points that its surface
+    carries. In the rest state the bones are at their first frame.
+    """
+    points = run.fibre_positions if inside else [context.extension.apply(each) for each in run.positions]
+    assert points is not None  # the caller asked _carries
+    numbers = run.numbers[:1] * len(run.numbers) if run.solver == "rest" else run.numbers
+    return np.array([lengths_at(*at, context) for at in zip(points, numbers, strict=True)])
 
 
 def lengths_at(points: Floats, number: int, context: MeasurementContext) -> Floats:

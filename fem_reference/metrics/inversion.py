@@ -1,6 +1,6 @@
 """Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
 
-It is computed from the surface alone, so it exists for every run; where a solver has an interior, its smallest det F tells more.
+It is computed from the surface alone, so every run has it; where a solver has an interior, its smallest det F is stricter.
 """
 
 from functools import lru_cache
@@ -32,7 +32,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     )
 
 
-@lru_cache(maxsize=4)  # a run is met against many others, and this is most of what measuring costs
+@lru_cache(maxsize=4)  # a run is measured against many others, and this takes most of the time
 def _windings(run: Run) -> Floats:
     """The outer windings (f, m) of the triangles in each frame; of frames that repeat one array, once."""
     still = run.positions.strides[0] == 0
@@ -49,7 +49,7 @@ def _share(windings: Floats, areas: Floats) -> Floats:
 
 
 def _first(windings: Floats, run: Run) -> tuple[str, ...]:
-    """Per frame the triangle with the greatest of ``windings`` (f, m) and where the run has it; empty without one above 0."""
+    """Per frame the triangle with the greatest of ``windings`` (f, m) and its place in the run; empty without one above 0."""
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(

@@ -33,9 +33,7 @@ _SAME = 1e-9
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics of the deviation ``r - r_reference`` [mm] over the fibres: signed ``mean``, ``least`` and ``greatest``, ``rms``,
-    and greatest magnitude ``max``.
-    """
+    """``mean``, ``least``, ``greatest``, ``rms`` and greatest magnitude ``max`` over the fibres of ``r - r_reference`` [mm]."""
     if not context.joints or len(run.numbers) < 2:
         return ()
     found, expected = both_lengths(run, reference, context)

@@ -24,15 +24,15 @@ OF, AGAINST = "surface", "itself"
 
 def measure(run: Run, _reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """``deepest`` [mm], as in ``geometry.interpenetration.penetration``: the greatest depth of this muscle and another in each
-    other, by their surfaces, 0 where they are apart. NaN in a frame in which a surface is not known; nothing where the run has no
-    other muscle.
+    other, by their surfaces, 0 where they are apart. NaN in a frame in which a surface is not known; no measure where the run has
+    no other muscle.
     """
     return _measured(run) if run.others else ()
 
 
 @lru_cache(maxsize=32)
 def _measured(run: Run) -> tuple[Measure, ...]:
-    """The same for every reference, so once for all of them."""
+    """The measures of a run, which are the same against every reference, computed once."""
     values, where = np.zeros(len(run.numbers)), [""] * len(run.numbers)
     for name, other in run.others.items():
         for i, number in enumerate(run.numbers):

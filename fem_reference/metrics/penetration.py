@@ -34,7 +34,7 @@ OF, AGAINST = "surface", "itself"
 
 # A triangle is small enough to follow a bone with edges up to this many times the reach of ``Exemption``.
 _FOLLOWS = 4.0
-# Deeper than this share of its half thickness is in the middle of a bone, which may be on its way out of the other side.
+# A point deeper than this share of the half thickness is in the middle of a bone, and may come out on the other side.
 _MIDDLE = 0.75
 
 _value = attrgetter("value")
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 class _Worst(NamedTuple):
-    """The greatest depth or the volume of a frame, and where."""
+    """The greatest depth or the volume of a frame, and its place in words."""
 
     value: float
     where: str
@@ -50,7 +50,7 @@ class _Worst(NamedTuple):
 
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
-    bones, without what is nearest to where contact is exempt; 0 where nothing is inside.
+    bones, without the part nearest to the exempt surface; 0 where nothing is inside.
 
     Depth is measured at the vertices of the surface, and between them in triangles that do not follow the bone; where the inside
     of the muscle reaches the middle of the bone, it is the depth of the inside. Near an attachment only depth added since rest
@@ -58,21 +58,21 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     not checked. A triangle follows a bone where all its corners are within the reach of ``Exemption`` and its edges are shorter
     than four times that: any greater depth between them is the part of a round bone that a flat triangle cuts off.
 
-    Depth is as exact as the field of the bone (``Grid.mean_error``, rounding counted). Volume is counted
-    at random points, see ``shared``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with
-    fifty times the points, smaller ones within 6 %. NaN in a frame whose surface encloses no finite volume, and in all where a
-    bone is not closed: it has no inside.
+    Depth is as exact as the field of the bone (``Grid.mean_error``, with rounding). Volume is counted at random points, see
+    ``shared``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with fifty times the points,
+    smaller ones within 6 %. NaN in a frame whose surface encloses no finite volume, and in all frames where a bone is not closed,
+    as it has no inside.
     """
     return _measured(run, context)
 
 
 @lru_cache(maxsize=8)
 def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """The same for every reference, so once for all of them."""
+    """The measures of a run, which are the same against every reference, computed once."""
     lost = _without_inside(context.bones)
     allowed = {} if lost else _allowed(context.exempt, context.bones, run.numbers)
     frames = [
-        [_Worst(np.nan, lost)] * 2 if lost or not _is_body(surface) else _frame(surface, number, context, allowed)
+        [_Worst(np.nan, lost)] * 2 if lost else _frame(surface, number, context, allowed)
         for number, surface in zip(run.numbers, map(run.surface.moved_to, run.positions), strict=True)
     ]
     deepest, volume = (
@@ -84,7 +84,9 @@ def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: dict[str, Floats]) -> list[_Worst]:
-    """Depth and volume of one frame."""
+    """Depth and volume of one frame, NaN where the surface encloses no finite volume."""
+    if not np.isfinite(enclosed_volume(surface.points, surface.triangles)):
+        return [_Worst(np.nan, "")] * 2
     exempt, deepest, volume, largest = context.exempt, _Worst(0.0, ""), 0.0, _Worst(0.0, "")
     fine = Surface(exempt.corners.carried @ surface.points, exempt.corners.at)
     for bone in context.bones:
@@ -101,7 +103,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
 
 
 def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed: Floats) -> _Worst:
-    """Depth beyond what is ``allowed`` (k,) at the points of a surface in pieces, with their ``gaps`` (k,) to a bone."""
+    """The greatest depth beyond the ``allowed`` (k,) one at the points of a surface in pieces, with ``gaps`` (k,) to a bone."""
     corners, reach = exempt.corners, exempt.reach
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])
@@ -117,8 +119,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
-    attachments that at rest, and any on attachments to this bone or to one that moves as it does at all frame ``numbers``.
+    """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: 0 where contact acts, the depth at
+    rest near attachments, any on attachments to this bone or to one that moves like it at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points
@@ -135,11 +137,6 @@ def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, .
     """True where a ``bone`` has this ``name`` or moves like the bone of this name."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def _is_body(surface: Surface) -> bool:
-    return bool(np.isfinite(enclosed_volume(surface.points, surface.triangles)))
 
 
 def _without_inside(bones: tuple[Bone, ...]) -> str:

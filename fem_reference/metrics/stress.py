@@ -1,7 +1,8 @@
-"""Stresses in the muscle's volume, of solvers that have them: means and quantiles over the volume at rest of the Cauchy stress.
+"""Stresses in the volume of a muscle, from solvers that have them: means and quantiles over the volume at rest.
 
-Along the fibres as they are, by von Mises, and the pressure, above 0 in compression, at four points of each tetrahedron: the
-greatest stress, at the rim of an attachment, grows without bound as these get smaller. Of runs without stresses there is none.
+They are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, above 0 in compression, at four points
+of each tetrahedron. The greatest stress is no measure: at the rim of an attachment it grows without bound as tetrahedra get
+smaller. Runs without stresses have no such measures.
 """
 
 from functools import partial

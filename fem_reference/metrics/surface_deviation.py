@@ -65,10 +65,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
-    """Distance (2n,) [mm] of the run's vertices to the reference's surface, then of the reference's to the run's.
-
-    NaN where a position of the frame is not finite.
-    """
+    """Distances (2n,) [mm] of vertices of the run to the reference's surface and the reverse; NaN where not finite."""
     here, there = (each.surface.moved_to(each.positions[frame]) for each in (run, reference))
     if np.array_equal(here.points, there.points):
         return np.zeros(len(here.points) + len(there.points))

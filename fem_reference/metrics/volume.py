@@ -6,8 +6,8 @@ from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.metrics import Measure, MeasurementContext, Shown, Statistic, measures
 from fem_reference.runs.store import Run
 
-_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # it stands first there
-# The volume is nearly kept, and says as little of what is left of an error as the worst place does.
+_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # where the volume is the first
+# The volume is nearly constant: as at the worst place, its error says little of the order with which others fall.
 STATISTICS = {
     "deviation": Statistic(
         "%",

@@ -1,4 +1,4 @@
-"""The attachments and the fibres of a muscle, as its case gives them."""
+"""Attachments and fibres of a muscle, from its case."""
 
 import logging
 import re
@@ -51,7 +51,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def unshifted(case: MuscleCase) -> MuscleCase:
-    """The case whose attachments are where their landmarks are: itself where no outline is shifted."""
+    """The case with its attachments at their unshifted landmarks; itself where no outline is shifted."""
     still = tuple(
         one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
         if one.outline and one.outline.shift and one.outline.shift.by
@@ -184,7 +184,7 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this many tets.
 TETS = 8000
-# Of so many lines for each that is needed, those farthest out, just below the surface, stand for fibres on it.
+# Lines traced for each surface fibre needed; the outermost, just below the surface, are used as fibres on it.
 _OUTER = 5
 
 
@@ -204,8 +204,8 @@ def _turning(case: MuscleCase) -> Floats:
 
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case as their source has them, in part outside the ``surface``, and their direction at any point: that of
-    the nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
+    """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point: that of the
+    nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
@@ -255,7 +255,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    """The lines in the file of a case, or between those in its files."""
+    """The fibres in files of a case, or between surface fibres in its files; None where it has none."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
     if (asked := case.fibres.chmd) is not None and asked.heads is not None:

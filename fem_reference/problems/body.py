@@ -22,7 +22,7 @@ from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 from fem_reference.problems.touching import Touching
 
-_OUTWARDS = 0.7  # the share of the way from the middle of a cell to each node at which fields are checked too
+_OUTWARDS = 0.7  # the share of the path from the middle of a cell to each node at which fields are checked too
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, degree of the pressure (None: no such unknown; 0: constant in each cell).
 # Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
@@ -51,15 +51,8 @@ def is_stabilised(element: str) -> bool:
     return displacement == pressure
 
 
-def boundary_facets(mesh: "Cells") -> Ints:
-    """The facets that belong to only one cell, as their corners (f, 3 or 4) in ascending order."""
-    return np.sort(outer_facets(mesh)[0], axis=1)
-
-
 def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
-    """The facets that belong to only one cell, as their corners (f, 3 or 4) in the order of ``facet_corners``, and that cell (f,).
-    They are in the order of their ascending corners.
-    """
+    """The facets of one cell only, (f, 3 or 4) corners as in ``facet_corners``, sorted by ascending corners; that cell (f,)."""
     sides = np.array(facet_corners(mesh.kind))
     every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
     _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
@@ -229,7 +222,7 @@ class Body:
 
     @property
     def begun(self) -> bool:
-        """True where it begins elsewhere than at rest, or under tension."""
+        """True where the body does not begin at rest and free of stress."""
         tense = in_situ.among(self.effects) is not None
         return self.start is not None or tense or (self.contact is not None and self.contact.in_situ is not None)
 
@@ -240,9 +233,7 @@ class Body:
 
     @property
     def remembers(self) -> bool:
-        """True where what touches depends on the states before: with friction, and where a part touches itself, as only what was
-        in front of it does.
-        """
+        """True where contact depends on earlier states: with friction, and where a part of the surface touches itself."""
         return self.rubs or any(law.one == law.other for law in self.touching)
 
     @property
@@ -270,9 +261,7 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which load steps end, to skip no motion and no end of an overlap at rest; InputError where a path cannot
-        be followed.
-        """
+        """Frame numbers at which load steps end, so that none skips motion or the end of an overlap; InputError for bad paths."""
         things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)

@@ -10,23 +10,21 @@ from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
-from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import friction, regions, tendons
+from fem_reference.problems import directions, friction, regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
     Prescribed,
-    boundary_facets,
     check_element,
     check_quadrature,
+    outer_facets,
     reference_nodes,
 )
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
-_UNIT = 1e-6  # the tolerance on the length of a unit vector
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume counts as flat
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
@@ -43,7 +41,7 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
         raise InputError("body", said(body), "a Body")
     _check_cells(body.mesh)
     _check_many("effects", body.effects, Effect, "effects")
-    _check_many("prescribed", body.prescribed, Prescribed, "what is prescribed where")
+    _check_many("prescribed", body.prescribed, Prescribed, "prescribed displacements")
     check_frames(body.frames, "frames")
     _check_rest(body)
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
@@ -69,9 +67,12 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
-    if not isinstance(size, tuple | list | np.ndarray) or getattr(size, "ndim", 1) != 1 or len(size) != 3:
-        raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
-    if not all(_is_number(one) and one > _SHORTEST for one in size):
+    if (
+        not isinstance(size, tuple | list | np.ndarray)
+        or getattr(size, "ndim", 1) != 1
+        or len(size) != 3
+        or not all(_is_number(one) and one > _SHORTEST for one in size)
+    ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
         raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
@@ -87,9 +88,12 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
 
 def check_frames(frames: object, place: str) -> None:
     """Raise InputError unless ``frames`` are increasing numbers."""
-    if isinstance(frames, str | bytes) or not isinstance(frames, Sequence | np.ndarray) or len(frames) == 0:
-        raise InputError(place, said(frames), "frame numbers, at least one")
-    if not all(_is_number(one) for one in frames):
+    if (
+        isinstance(frames, str | bytes)
+        or not isinstance(frames, Sequence | np.ndarray)
+        or len(frames) == 0
+        or not all(_is_number(one) for one in frames)
+    ):
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "frame numbers that are each later than the one before")
@@ -104,7 +108,6 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_integer(value: Any) -> bool:
-    """True for an integer that is not a bool."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
@@ -164,7 +167,6 @@ def _check_indices(place: str, given: Any, width: int, count: int) -> None:
 
 
 def _check_volumes(mesh: Cells) -> None:
-    """Raise InputError where a cell has no volume."""
     corners = mesh.points[mesh.cells[:, [0, 1, 2, 3 if mesh.kind == "tetrahedron" else 4]]]
     edges = corners[:, 1:] - corners[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
@@ -201,7 +203,7 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
     """Raise InputError unless each region in ``names`` has facets, all of them on the boundary of the cells."""
-    boundary = set(map(tuple, boundary_facets(mesh).tolist()))
+    boundary = set(map(tuple, np.sort(outer_facets(mesh)[0], axis=1).tolist()))
     for name in names:
         facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
         lost = sorted(facets - boundary)
@@ -223,30 +225,17 @@ def _check_needs(body: Body) -> None:
     if body.fibre is None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
     for places in body.mesh.places():
-        _check_unit(body.fibre, places)
-
-
-def _check_unit(fibre: Directions, places: Floats) -> None:
-    """Raise InputError unless the directions at ``places`` (n, 3) [mm], one in each cell, are unit vectors."""
-    cells = np.arange(len(places))
-    try:
-        found = np.asarray(fibre(cells, places), float)
-    except Exception as error:  # any error in a function of the caller
-        raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
-    if found.shape != (len(cells), 3):
-        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
-    lengths = np.linalg.norm(found, axis=1)
-    worst = int(np.argmax(np.where(np.isfinite(lengths), np.abs(lengths - 1), np.inf)))
-    if not abs(lengths[worst] - 1) <= _UNIT:
-        raise InputError("fibre", f"a direction of length {lengths[worst]:.6g} in cell {worst}", "unit vectors")
+        directions.check_unit(body.fibre, places)
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where laws leave a part of the body without (``regions.check``), a tendon or friction is beside tension at
-    rest, two regions of its surface prescribe different exact displacements at shared places, or a path of motion cannot be
-    followed. They are compared at all frames, all stops, and the middles between them.
+    """Raise InputError where a part of the body has no law of a kind (``regions.check``), the normal of a law is along fibres, a
+    tendon or friction is beside tension at rest, two regions of its surface prescribe different exact displacements at shared
+    places, or a path of motion cannot be followed. Displacements are compared at all frames, all stops, and the middles between
+    them.
     """
     regions.check(body)
+    directions.check_normals(body)
     tendons.check(body)
     friction.check(body.frictions, begun=body.begun)
     ends = np.unique([*body.frames, *body.stops])
@@ -261,7 +250,7 @@ def check_agreement(body: Body) -> None:
             if not off.max() <= SAME * (body.size + np.abs(found).max()):
                 x, y, z = places[np.argmax(off)]
                 got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
-                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")
+                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at shared places")
 
 
 def _check_start(body: Body) -> None:

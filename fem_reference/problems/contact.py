@@ -18,7 +18,7 @@ _LOST = 0.5
 # The least half thickness of a bone, in spacings of contact points: between four of them, 0.71 from each, a thinner one
 # would pass.
 _THINNEST = 0.75
-# Where the overlap at rest reaches down to this share of a bone's half thickness, no direction leads out.
+# Above this share of a bone's half thickness, the side to which an overlap at rest is to be removed is not defined.
 _MIDDLE = 0.95
 
 log = logging.getLogger(__name__)
@@ -40,11 +40,11 @@ class ContactLaw:
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
     ``stiffness``: k [MPa/mm]; under pressure p a surface penetrates by p / k.
 
-    ``relaxed``: two frame numbers. A point that overlaps at the first has its depth reduced to no pressure there, and feels
-    its full depth from the second on: an overlap at rest is removed gradually.
+    ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: it causes no pressure at the first, and
+    counts in full from the second on.
 
     ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
-    there, with the pressure that balances the tension (``effects.in_situ``); later a point feels the change of its gap.
+    there, with the pressure that balances the tension (``effects.in_situ``); later only the change of its gap counts.
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
     k, and slides under the friction times the pressure.

@@ -34,8 +34,8 @@ log = logging.getLogger(__name__)
 # that is less: error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of the
 # latter; those of fibre lengths and volumes are tighter where only these change.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the other effects; the least such stress is that of this
-# strain, which rounding makes.
+# The negligible change of stress by an effect, relative to the stress of the other effects, which is at least that of a strain of
+# rounding.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 # The error of the guessed position of a point, as a share of its path past a bone. In `hip_flexion` it is 0.83.
 _DOUBT = 1.0
@@ -73,7 +73,7 @@ class Decision:
         """The decision in words."""
         if self.indicator is None:
             pressing = isinstance(self.effect, Interaction)
-            return "kept, as no estimate tells what meets" if pressing else "kept, part of the material"
+            return "kept, as no estimate shows what touches" if pressing else "kept, part of the material"
         return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:
@@ -82,13 +82,13 @@ class Decision:
     @property
     def _word(self) -> str:
         if self.listed:
-            return "acts, as it is listed" if self.needed else 'acts, as it is listed ("auto" would do without it)'
+            return "acts, as it is listed" if self.needed else 'acts, as it is listed ("auto" would leave it out)'
         if not self.needed:
             return "left out"
         if self.turned_out is not None:
             return f"needed as it turned out at frame {self.turned_out}"
         pressing = isinstance(self.effect, Interaction)
-        return "watched for, and in the equations where something is pressed" if pressing else "needed"
+        return "watched, and in the equations where something is pressed" if pressing else "needed"
 
     @property
     def _because(self) -> str:
@@ -133,7 +133,7 @@ def _chosen(rest: Setup) -> Ints:
 
 
 def estimates(case: MuscleCase, rest: Setup) -> Estimates:
-    """Estimates that effects need of a case, from a guessed path of the surface; each point with the bones nearest to it."""
+    """Estimates of a case for its effects, from a guessed motion of the surface in which each point follows the nearest bones."""
     instants = np.unique(np.linspace(0, len(case.numbers) - 1, _FRAMES).round().astype(int))
     frames, chosen = [case.numbers[i] for i in instants], _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
@@ -216,8 +216,8 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
 
 
 def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. The
-    hundredths of its area at both extremes are left out, as single triangles at a rim may be there.
+    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. A
+    hundredth of its area at either extreme is left out, as it may be single triangles at a rim.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0

@@ -13,7 +13,7 @@ from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
-# An end this far [mm] from its attachment does not reach it; within that the muscle is as good as attached there.
+# The greatest distance [mm] from its attachment at which an end reaches it: so near, the muscle is practically attached.
 REACHES = 2.0
 SIDES = ("first", "last")  # ends of a fibre
 
@@ -37,7 +37,7 @@ class FibreEnds:
 
     @cached_property
     def tendons(self) -> Floats:
-        """The points (k, 2, 3) [mm] of bones at rest to which ends go on; NaN where they do not."""
+        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN where they do not."""
         points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
         return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
 
@@ -47,14 +47,14 @@ class FibreEnds:
         return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
 
     def taken(self, rest: Floats, frame: float) -> Floats:
-        """The places (k, 2, 3) [mm] to which the bones take the ends from ``rest`` (k, 2, 3) [mm], by a ``frame``."""
+        """The places (k, 2, 3) [mm] of ends at ``rest`` (k, 2, 3) [mm] moved with their bones to a ``frame``."""
         found = np.array(rest)
         for i, one in enumerate(self.attached):
             found[self.by == i] = apply(one.bone.pose(frame), rest[self.by == i])
         return found
 
     def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
-        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from where bones take them from ``rest`` (k, 2, 3)."""
+        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from those at ``rest`` moved with their bones."""
         return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
@@ -69,8 +69,8 @@ class FibreEnds:
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """Numbers of ends, of those that continue as a tendon, and of those beside their attachment, all of both by name; the share
-        of each attachment that they cover [%].
+        """Numbers of ends: all, those that continue as a tendon and those beside their attachment, these with their names; and the
+        covered share of each attachment [%].
         """
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
@@ -130,9 +130,9 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
-    """The ``lines``, those that end beside their attachment with the straight piece to its closest point, in steps of 2 mm or less.
+    """The ``lines``, those that end beside their attachment extended straight to its closest point, in steps of at most 2 mm.
 
-    Where a piece leaves the muscle its points are to be moved back into it.
+    An extension may leave the muscle; the caller moves its points back into it.
     """
     parts = []
     for i, (first, last) in enumerate(ends.beside):
@@ -149,9 +149,7 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The area of the triangles ``part`` (r, 3, 3) within the mean spacing of so many ``fibres`` of ``ends`` (m, 3), as a share:
-    whole triangles, by their centroids, so that it is wrong by up to the area of those that the border of the region cuts.
-    """
+    """The share of the area of triangles ``part`` (r, 3, 3) whose centroid is within the mean fibre spacing of ``ends`` (m, 3)."""
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():
         return 0.0

@@ -57,7 +57,7 @@ def _cut(mesh: Cells) -> tuple[Cells, Ints]:
     for i, node in enumerate(own):
         part, j = np.argwhere((nodes == node).all(axis=2))[0]
         shared[mesh.cells[:, i]] = names[:, part, j]
-    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # equal but for rounding
+    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # equal up to rounding
     facets = _facets(mesh, names, shares)
     return Cells(points, names.reshape(-1, len(own)), mesh.kind, mesh.degree, facets), shared
 
@@ -86,8 +86,8 @@ def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes
-    are equal where the same corners have the same ``shares`` (8, k, c), so nodes of touching bodies stay separate.
+    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes are
+    equal where the same corners have the same ``shares`` (8, k, c).
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)

@@ -1,4 +1,4 @@
-"""Coulomb's friction of points on a surface: a point sticks to a place by a spring, and slides where that would pull too hard."""
+"""Coulomb's friction of points on a surface: a point sticks by a spring, and slides where its force would exceed the limit."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -11,8 +11,8 @@ from fem_reference.foundations.mesh import Floats
 
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
-    """Raise InputError where a coefficient of friction is no number above 0, None without; or where there is one in a body that has
-    ``begun`` elsewhere than at rest or under tension, as nothing holds its points yet.
+    """Raise InputError where a coefficient of friction is neither None nor above 0, or where a body with friction has ``begun``
+    deformed or under tension: the places to which its points stick are not known.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):

@@ -110,8 +110,8 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The deviation [mm] of the axis from the straight line between two attachments: that at rest in the middle third, and that
-    of bending by bones that turn. A sideways shift deviates by a twentieth of that, in two waves, which are stiffer.
+    """The deviation [mm] of the axis from the straight line between two attachments: that at rest in the middle third, that of
+    bending by bones that turn, and a twentieth of the travel, as a sideways shift bends in two waves, which are stiffer.
     """
     if len(rest.attached) < 2:
         return 0.0

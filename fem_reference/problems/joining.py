@@ -23,13 +23,13 @@ Range = tuple[int, int]
 
 
 def called(piece: str, name: str) -> str:
-    """The name, in the whole, of what has a ``name`` in a ``piece``."""
+    """The name in the joined body of a part of a ``piece`` with a ``name`` there."""
     return f"{piece} {name}"
 
 
 @dataclass(frozen=True, eq=False)
 class DirectionsByPiece:
-    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; x where one has none."""
+    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; along x in pieces without fibres."""
 
     ranges: tuple[Range, ...]
     of: tuple[Directions | None, ...]
@@ -59,8 +59,8 @@ class Share:
 
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
-    """The body that ``bodies`` make up, by the name of each, with ``touching`` between facets of the whole. What all have alike
-    acts on all of it, what some have in their cells alone. InputError where what cannot differ differs.
+    """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the whole. Effects that all bodies have
+    act everywhere, others in the cells of their bodies. InputError where bodies differ in what must be the same.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -130,7 +130,7 @@ def _acting(
 
 
 def _check_pressure(bodies: Mapping[str, Body]) -> None:
-    """Raise InputError where some bodies have an unknown, such as the pressure, that others have not."""
+    """Raise InputError where some bodies have an unknown, such as the pressure, that others lack."""
     brought = {name: {one for effect in body.effects for one in effect.unknowns} for name, body in bodies.items()}
     if len({frozenset(one) for one in brought.values()}) > 1:
         got = "; ".join(f"{name}: {', '.join(sorted(one)) or 'none'}" for name, one in brought.items())

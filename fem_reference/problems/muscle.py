@@ -145,7 +145,7 @@ class MuscleProblem(Setup):
 
 
 def setup(case: MuscleCase) -> Setup:
-    """Read and check the surfaces of a case and choose its attachments; InputError names what is unusable."""
+    """Read and check the surfaces of a case and choose its attachments; InputError names the unusable part."""
     place = join(case.place, "muscle.surface")
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
@@ -182,9 +182,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
 def assembled(
     rest: Setup, mesh: TetMesh, effects: tuple[Effect, ...], lines: tuple[Polylines, Directions | None], apart: float
 ) -> MuscleProblem:
-    """The set-up ``rest`` filled with a ``mesh``, its fibres and their direction (``lines``); points of contact and of springs are
-    ``apart`` [mm] from each other.
-    """
+    """The set-up ``rest`` filled with a ``mesh`` and fibres (``lines``); points of contact and of springs are ``apart`` [mm]."""
     springs = {
         one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
         for one in rest.attached
@@ -212,7 +210,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm] with the facets of attachments: to the rim where the mesher keeps it, else below."""
+    """Tetrahedra of a ``size`` [mm] with the facets of attachments: up to their rims where the mesher keeps them, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)

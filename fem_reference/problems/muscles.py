@@ -32,14 +32,12 @@ from fem_reference.problems.touching import Touching
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.muscles import MusclesCase
 
-_BETWEEN = 8  # looks at a moving bone from one stop to the next
+_BETWEEN = 8  # samples of the motion of a bone between two stops
 
 
 @dataclass(frozen=True)
 class Span:
-    """The part of joined arrays that is of one muscle, by its ``name``: of the ``vertices`` of the surface, the points of
-    ``fibres``, the ``points`` of the mesh, and its ``cells``.
-    """
+    """The slices of joined arrays for one muscle: vertices of the surface, points of fibres, points of the mesh, and cells."""
 
     name: str
     vertices: slice
@@ -124,7 +122,7 @@ class MusclesProblem:
 
     @property
     def muscle(self) -> MuscleProblem:
-        """None of them: InputError."""
+        """No single muscle: InputError."""
         raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
 
     def write_meshes(self, folder: Path) -> None:
@@ -178,7 +176,7 @@ def _meshes(parts: Sequence[TetMesh]) -> TetMesh:
 
 
 def setup(case: MusclesCase) -> MusclesSetup:
-    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names what is unusable."""
+    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names the unusable part."""
     found = dict[str, Setup]()
     for i, part in enumerate(case.parts):
         with case.placed(i):
@@ -210,8 +208,8 @@ def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[
 
 
 def _beyond(case: MuscleCase, rest: Setup) -> float:
-    """The distance [mm] by which a muscle may leave the place that bones give it: it bulges where it shortens at the same volume,
-    is pressed as far as a bone in contact may be in it, and moves by its length at most under external loads.
+    """The distance [mm] by which a muscle may deviate from the motion of its bones: it bulges where it shortens at constant volume,
+    bones in contact displace it by their penetration, and external loads move it by its length at most.
     """
     if any(one.outer for one in case.effects):
         return length_of(rest)
@@ -222,8 +220,8 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
 
 
 def clearance(one: Setup, other: Setup) -> float:
-    """A lower bound [mm] of the distance of two muscles over all frames that only follow the bones: that at rest, less what
-    either can move with a bone. Below 0 where they may cross.
+    """A lower bound [mm] of the distance over all frames of two muscles that only follow the bones: that at rest, less the greatest
+    displacement of either with a bone. Below 0 where they may cross.
     """
     between = max(spacing(one.surface), spacing(other.surface))  # vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
@@ -249,7 +247,7 @@ def _travel(rest: Setup) -> float:
 
 
 def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
-    """Frame numbers at which a bone is looked at: the ``frames``, its keyframes among these, and some between each two."""
+    """Frame numbers at which the motion of a bone is sampled: ``frames``, its keyframes among these, and some between each two."""
     assert bone.motion is not None  # called for moving bones only
     stops = sorted({*map(float, frames), *(one for one in bone.motion.frames if frames[0] <= one <= frames[-1])})
     return np.interp(np.linspace(0, len(stops) - 1, _BETWEEN * (len(stops) - 1) + 1), np.arange(len(stops)), stops)

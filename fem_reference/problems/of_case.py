@@ -31,7 +31,7 @@ CaseProblem = MuscleProblem | MusclesProblem | FieldProblem
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on which effects a case needs, and why, from the set-up that ``rest`` gives, or a new one; none of a field."""
+    """Decisions on the effects that a case needs, with reasons, from the set-up ``rest`` or a new one; none for a field."""
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -68,7 +68,6 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
-    """The muscle, its bones, attachments, effects and frames."""
     surface, frames = setup.surface, case.frames
     return {
         "muscle": {
@@ -118,7 +117,7 @@ def _motion(motion: RigidMotion | None) -> str:
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """The effect of the bones' motion on a muscle, its regions, and why it needs its effects, in words; nothing of a field."""
+    """The effect of the bones' motion on a muscle, its regions, and the reasons for its effects, in words; empty for a field."""
     if isinstance(case, MusclesCase):
         every = case.decisions or explained(case, lambda: setup)
         return {"effects": {one.title: one.why for one in every}}
@@ -170,7 +169,7 @@ def scalar_case(case: Case) -> ScalarCase:
 
 
 def setup(case: Case) -> CaseSetup:
-    """The set-up of a case. InputError names what is unusable."""
+    """The set-up of a case; InputError names the unusable part."""
     if isinstance(case, MusclesCase):
         return muscles.setup(case)
     return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))

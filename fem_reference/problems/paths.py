@@ -22,7 +22,7 @@ def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
 
 @dataclass(frozen=True)
 class Rest:
-    """Nothing moves."""
+    """No motion."""
 
     def __call__(self, points: Floats, frame: float) -> Floats:  # noqa: ARG002
         """Zero, (n, 3) [mm]."""
@@ -53,7 +53,7 @@ class Affine:
 def radially(
     share: float, along: tuple[float, float, float] = (1.0, 1.0, 1.0), knots: tuple[tuple[float, float], ...] = ONCE
 ) -> Affine:
-    """Displacement away from the origin by ``share`` of the distance times the amount, along axes whose ``along`` is 1, not 0."""
+    """Displacement away from the origin by ``share`` of the distance times the amount, along the axes with an ``along`` of 1."""
     x, y, z = along
     return Affine(((share * x, 0.0, 0.0), (0.0, share * y, 0.0), (0.0, 0.0, share * z)), knots=knots)
 

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 
 # The three problems that solvers take: a muscle, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
-# The empty surface of a problem that has none.
+# The surface of a problem without one.
 NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 

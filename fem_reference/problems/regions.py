@@ -1,4 +1,4 @@
-"""The regions of a muscle, as its case gives them; checks of those of any body, and their sizes in words."""
+"""The regions of a muscle from its case, their sizes in words, and checks of the regions of any body."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -20,15 +20,15 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 _LEAST = 0.5  # the least share of laws of a kind at a point
-# The greatest share in a region is at least this: where its width is greater than its depth, the region is hardly there.
+# The least accepted maximum of the share in a region: it is low where the width is greater than the depth.
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the error of a sum of shares that is one
-_SURE = 0.99  # below that the greatest share in a region is worth a word
-_SEEN = 1e-3  # an overlap, as a share of the volume, that is worth a word
+_SURE = 0.99  # below that the greatest share in a region is reported
+_SEEN = 1e-3  # an overlap, as a share of the volume, that is reported
 
 
 def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> dict[str, Region]:
-    """The regions of a case by name, in its set-up ``rest``; those of one name are one. ``fill``: tetrahedra of a size [mm]."""
+    """The regions of a case by name, in its set-up ``rest``; equal names are united. ``fill``: tetrahedra of a size [mm]."""
     found: dict[str, list[Region]] = {}
     for i, region in enumerate(case.region):
         found.setdefault(region.name, []).append(Blended(_depth(case, i, rest, fill), region.width))
@@ -59,7 +59,7 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
 
 
 def facts(rest: Setup) -> dict[str, str]:
-    """The volume of each region of a muscle, and of what it has in common with others, in words."""
+    """The volume of each region of a muscle, and of its overlaps with others, in words."""
     points, volume = samples(rest.surface), enclosed_volume(rest.surface.points, rest.surface.triangles)
     shares = {name: region(points) for name, region in rest.regions.items()}
 
@@ -77,8 +77,8 @@ def facts(rest: Setup) -> dict[str, str]:
 
 
 def check(body: Body) -> None:
-    """Raise InputError where an effect acts in a region that there is not, or nowhere, or shares are not from 0 to 1; or where laws
-    of shape, of volume, or of the pressure unknown leave a part of the body without.
+    """Raise InputError where an effect acts in a region that does not exist or has no points, shares are not from 0 to 1, or a part
+    of the body has no law of shape, of volume, or of the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
     for i, region in named.items():
@@ -110,9 +110,7 @@ def check(body: Body) -> None:
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
-    """Raise InputError where ``laws`` of one ``kind``, if there are some, leave one of the ``points`` (n, 3) without. Of those that
-    share the pressure unknown p the shares are 1 together: else p is no pressure.
-    """
+    """Raise InputError where ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of a pressure sum to 1."""
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
     if laws and not off.max() <= 0:

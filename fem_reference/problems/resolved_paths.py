@@ -22,22 +22,20 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Turning, apply
 
-# [rad] by which anything turns within a load step at most, and between two frames at which it is looked at; and the share of the
-# body's size that anything travels between two of these.
+# The greatest rotation [rad] in a load step and between two samples, and the greatest travel between two samples as a share of the
+# body's size.
 TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
-# A quarter of a circle is 1.11 times as long as its chord; what is longer, and by this share of the body's size, comes back.
+# A quarter of a circle is 1.11 times as long as its chord; a path longer than that, and by this share of the body's size, returns.
 _BENT, _BACK = 1.12, 0.01
-_SAMPLES, _BETWEEN = 1024, 16  # of what is not known, over all frames and between two
-_POINTS = 32  # of a region, which are looked at
-_MOST = 20_000  # frames at which anything is looked at
-_SHORTEST = 1e-9  # of all frames, within which what goes far jumps
+_SAMPLES, _BETWEEN = 1024, 16  # samples of an unknown motion, over all frames and between two
+_POINTS = 32  # sampled points of a region
+_MOST = 20_000  # sampled frames
+_SHORTEST = 1e-9  # share of all frames within which a long motion counts as a jump
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``) and the ``turning`` that is known of them; ``place`` names them in messages.
-    ``scale``: of an amount, as of a ramp, which is no motion.
-    """
+    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, ``place`` in messages; ``scale``: a mere amount."""
 
     place: str
     at: Callable[[float], Floats]
@@ -58,7 +56,7 @@ def turning(path: object, points: Floats) -> Turning | None:
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:
-    """The amount of an ``effect`` as a point that moves by ``size`` [mm] from none to all of it; None where all acts always."""
+    """The amount of an ``effect`` as a point that moves by ``size`` [mm] up to the full amount; None where it is constant."""
     if type(effect).amount is Effect.amount:
         return None
     knots = effect.ramp if isinstance(effect, Ramped) and type(effect).amount is Ramped.amount else None
@@ -76,7 +74,7 @@ def some(points: Floats) -> Floats:
 
 def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[float, ...]:
     """Frame numbers between the first and the last of ``frames`` at which a load step ends, for a body of a ``size`` [mm];
-    InputError where anything jumps, is not finite, or goes on for ever.
+    InputError where anything jumps, is not finite, or moves without end.
     """
     if len(frames) < 2 or not things:
         return ()
@@ -107,7 +105,7 @@ def posed(place: str, pose: Callable[[float], Floats], points: Floats) -> Moving
 
 
 def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
-    """The frames at which a thing is looked at first."""
+    """The frames of the first samples of a thing."""
     first, last = frames[0], frames[-1]
     if thing.turning is None:
         count = max(_BETWEEN, -(-_SAMPLES // (len(frames) - 1)))
@@ -123,13 +121,11 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
 
 
 class _Samples:
-    """Things at ``frames`` (m,): where they are (m, p, 3), how far they have turned (m,) [rad], how long their paths are (m, p)
-    [mm], and without what all do alike.
-    """
+    """Samples of things at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], lengths (m, p) [mm], less common motion."""
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
         self.things, self.frames, self.size = things, frames, size
-        with np.errstate(all="ignore"):  # what is not finite goes too far
+        with np.errstate(all="ignore"):  # NaN and infinity count as too far
             self.places = [_places(thing, frames) for thing in things]
             self.strides = [_steps(place) for place in self.places]
             bodies = [place for thing, place in zip(things, self.places, strict=True) if not thing.scale]
@@ -156,14 +152,14 @@ class _Samples:
         return (self.frames[:-1] + spans / 2)[found]
 
     def _jump(self, i: int) -> InputError:
-        """The error that names what goes farthest in the interval of a number."""
+        """The error for the thing that moves farthest in the interval of number ``i``."""
         far = [float(strides[i].max()) for strides in self.strides]
         which = int(np.argmax(far))
         got = f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a turn by {self.angles[which][i]:.3g} rad"
         return InputError(f"{self.things[which].place}: path at frame {self.frames[i]:g}", got, "one without jumps")
 
     def farthest(self, at: int) -> int:
-        """The last of the frames up to which one load step may go from that of a number."""
+        """The number of the last frame up to which one load step may go from the frame of number ``at``."""
         return max(at + 1, min(self.reach(i, at) for i in range(len(self.things))))
 
     def reach(self, i: int, at: int) -> int:
@@ -193,9 +189,7 @@ def _steps(places: Floats) -> Floats:
 
 
 def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
-    """The angles [rad] that a thing turns by from each of ``frames`` (m,) to the next, (m - 1,): as is known, or else as the
-    direction from the middle of its points at ``places`` (m, p, 3) to one of them turns at most.
-    """
+    """The angles (m - 1,) [rad] between ``frames`` (m,): known, or the greatest of a direction from the middle to a point."""
     if thing.turning is not None:
         knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)

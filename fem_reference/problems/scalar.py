@@ -1,4 +1,4 @@
-"""Scalar scenes as arrays for solvers: mesh, effects, boundary conditions. It knows no solver."""
+"""Scalar cases as arrays for solvers: mesh, effects, boundary conditions; independent of any solver."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,7 +89,7 @@ class FieldProblem:
 
 
 def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
-    """The problem of a case, its mesh refined so many times; InputError names what is not usable."""
+    """The problem of a case with ``refinements`` of its mesh; InputError names the unusable part."""
     mesh = check(mesh_of(case))
     dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
@@ -135,7 +135,7 @@ def _check_effects(case: ScalarCase, mesh: FieldMesh) -> None:
 
 
 def _try(formula: str, points: Floats, place: str) -> None:
-    """InputError at ``place`` where a formula names a coordinate that there is not, or has no finite value at one of ``points``."""
+    """InputError at ``place`` where a formula names an unknown coordinate, or has no finite value at one of ``points``."""
     try:
         values = at(formula, points)
     except InputError as error:
@@ -220,7 +220,6 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
 
 
 def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
-    """The facets that a condition is on."""
     facets, x, interval = mesh.facets, mesh.points[:, 0], mesh.cells.shape[1] == 2
     if interval == (entry.on == "rim"):
         return facets[:0]
@@ -240,7 +239,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
 
 
 def mesh_of(case: ScalarCase) -> FieldMesh:
-    """The mesh of a scalar case; InputError names what is unusable."""
+    """The mesh of a scalar case; InputError names the unusable part."""
     domain = case.domain
     if domain.mesh is not None:
         return _mesh_files(case, domain.mesh)
@@ -293,7 +292,7 @@ def numbers(path: Path) -> Floats:
 
 
 def whole_numbers(path: Path, values: Floats) -> Ints:
-    """``values`` of a file as numbers of vertices; InputError where they are none."""
+    """``values`` of a file as numbers of vertices; InputError where they are not whole numbers."""
     wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
     if wrong.any():
         raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")

@@ -25,12 +25,12 @@ from fem_reference.scenes.muscle import MuscleCase, Vector
 
 # Distances to a bone are computed up to here [mm] from it.
 DISTANCE_MARGIN = 12.0
-# An axis of a joint is that of its bone's rotation within this angle [rad], and passes it within this distance [mm].
+# The greatest angle [rad] and distance [mm] between the axis of a joint and that of its bone's rotation.
 _SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
 
 
 def kept_distances() -> Path:
-    """The folder where grids of distances are kept; it may be deleted."""
+    """The folder of stored distance grids; it may be deleted."""
     return platformdirs.user_cache_path("fem_reference") / "distances"
 
 
@@ -97,7 +97,7 @@ class AttachedVertices:
 @dataclass(frozen=True, eq=False)
 class Setup:
     """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
-    frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, a function from rest
+    frames wanted; ``interval`` [s] from a frame number to the next where the case states it; ``start``, a function from rest
     positions (n, 3) to those of the first frame, where these differ; ``joints``, about whose axes bones turn; ``regions``, by
     name those in which effects act.
     """
@@ -122,7 +122,7 @@ class Setup:
 
     @property
     def body(self) -> Body | None:
-        """The finite elements that it is solved with, once it is filled with them."""
+        """The finite element body, which exists once the set-up is filled with elements."""
         return None
 
     def begin(self, rest: Floats) -> Floats:

@@ -21,14 +21,14 @@ Counts = tuple[int, int, int]
 
 # Nodes nearer than this share of the body's size are one node.
 _SAME = 1e-9
-# How far the sides of the square in a disc bulge, so that three blocks meet at its corners with 120 degrees each.
+# The bulge of the sides of the square in a disc, by which three blocks meet at its corners with 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
 # Half the square's side over the radius of its disc.
 _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# How much faster than on average the angle from the apex grows there, so that arc length grows evenly.
+# The growth of the angle at the apex, above its mean, by which the arc length grows evenly.
 _APEX = 0.3
 
 
@@ -76,7 +76,7 @@ def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
 
 
 def _merged(points: Floats) -> tuple[Floats, Ints]:
-    """The different points (n, 3) among ``points``, and which of them each is."""
+    """The different points (n, 3) among ``points``, and the number of each of ``points`` among them."""
     tolerance = _SAME * float(np.ptp(points, axis=0).max())
     first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
     name = connected_parts(first, second, len(points))
@@ -114,9 +114,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
 
 
 def joined(pieces: Mapping[str, Cells]) -> Cells:
-    """The mesh of separate ``pieces``, all of one kind and degree. A region is named after its piece and its region there, as in
-    ``left_x1``.
-    """
+    """The mesh of separate ``pieces`` of one kind and degree; regions have the name of their piece before theirs: ``left_x1``."""
     meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
     if len(kinds) != 1:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
@@ -172,7 +170,7 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
     """Three blocks of an octant around its corner, by their ``place`` from points (n, 3) on the unit cube's outer faces, unit
-    vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the way outward; ``ends``: the faces z0 and z1.
+    vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the path outward; ``ends``: the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:

@@ -25,12 +25,12 @@ NONE: Shares = MappingProxyType({})
 
 # The tetrahedra that are sampled, evenly spread, and the places evaluated at once, so that their jets fit in a cache.
 _MOST, AT_ONCE = 2048, 1024
-_SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
+_SMALLEST = 0.05  # the least det F of evaluated tetrahedra; curved ones may be inside out between their corners
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
-    """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of what is ``acting``, (effect, amount) each, at a
-    ``state`` whose F are the jets, and of a stress ``at_rest``.
+    """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of effects ``acting``, (effect, amount) each, and of
+    a stress ``at_rest``, at a ``state`` whose F are jets.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
@@ -38,8 +38,8 @@ def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float =
 
 
 def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = NONE) -> Floats:
-    """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of what is ``acting`` at deformation gradients ``F`` (n, 3, 3) with
-    fibres along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects of time.
+    """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of effects ``acting`` at deformation gradients ``F`` (n, 3, 3) with fibres
+    along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects of time.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
@@ -48,15 +48,15 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
         along = None if fibre is None else list(fibre[some].T)
         state = State([jets[0:3], jets[3:6], jets[6:9]], pressure=0.0, fibre=along, functions=JET_FUNCTIONS)
         state = replace(state, regions={name: share[some] for name, share in shares.items()})
-        with np.errstate(all="ignore"):  # what is no number is needed
+        with np.errstate(all="ignore"):  # an effect with a stress of NaN counts as needed
             found[some] = first_piola(acting, state, len(F[some])) @ np.swapaxes(F[some], 1, 2)
     return found
 
 
 @dataclass(frozen=True)
 class StressSizes:
-    """Sizes of stresses [MPa] in a state, root mean square over the volume: of what ``acts``, without its share of pressure, and
-    what each of others would add to that, ``added``; and the smallest and the greatest ``stretch`` of fibres. NaN where no
+    """Sizes of stresses [MPa] in a state, root mean square over the volume: of the acting effects without pressure (``acts``), and
+    of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN where no
     tetrahedron has a positive volume.
     """
 
@@ -66,9 +66,7 @@ class StressSizes:
 
 
 class StressSamples:
-    """Tetrahedra of a ``mesh``, with the unit vectors ``fibre`` (m, 3) along their fibres and the ``regions`` in which effects act:
-    stresses of states of their points.
-    """
+    """Samples of the stress in tetrahedra of a ``mesh``, with ``fibre`` (m, 3) directions and the ``regions`` of effects."""
 
     def __init__(
         self, mesh: TetMesh, fibre: Floats | None, regions: Mapping[str, Region] = MappingProxyType({})
@@ -82,7 +80,7 @@ class StressSamples:
         self.shares = {name: region(middles) for name, region in regions.items()}
 
     def sizes(self, positions: Floats, acting: Acting, others: Acting) -> StressSizes:
-        """The sizes for what is ``acting``, and for each of the ``others`` on top, where the points are at ``positions`` (n, 3)."""
+        """The sizes for the effects ``acting`` and each of the ``others`` besides, with the points at ``positions`` (n, 3)."""
         F = edge_vectors(positions[self.tets]) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
         if not good.any():
@@ -98,14 +96,14 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change by an effect of the stress ``now`` (n, 3, 3) of what is ``acting``: an energy its own, in what is prestretched."""
+    """The change of the stress ``now`` (n, 3, 3) by an effect: of an energy its own stress, with the prestrains ``acting``."""
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of fibres that energies see, but for a hundredth of the volume each."""
+    """The smallest and the greatest stretch of fibres in the energies, beyond a hundredth of the volume at either end."""
     if fibre is None:
         return 1.0, 1.0
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
@@ -119,12 +117,11 @@ def _mean(stress: Floats, volumes: Floats) -> float:
 
 
 class Watch:
-    """The influence of effects that a ``case`` left out in frames that are solved, one after the other.
+    """The influence of effects that a ``case`` left out in frames that are solved, one after the other. ``frames``: the surface
+    (n, 3) of each, and the stresses in its tetrahedra, if any.
 
-       From a state the stress of an omitted effect follows without another solution, and so does the stress of those that
-           act. While a run is made, the latter is the ``known`` estimate or, where greater, the stress found so far; at its
-       end, the greatest found.
-    ``frames``: the surface (n, 3) of each, and the stresses in its tetrahedra, where there are any.
+    The stress of an omitted effect follows from a state without another solution, as does that of the effects that act. While a run
+    is made, the latter is the ``known`` estimate or, if greater, the stress found so far; at its end, the greatest found.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
@@ -162,7 +159,6 @@ class Watch:
 
     @property
     def _tense(self) -> bool:
-        """True in situ."""
         return in_situ.among(self.case.effects) is not None
 
     def _most(self) -> float:
@@ -180,7 +176,7 @@ class Watch:
         """The decision on an effect: by the stress that it adds in the tetrahedra, of fibres by that alone."""
         effect = self.left[i]
         found = effect.indicator(now)
-        assert found is not None  # of what was left out
+        assert found is not None  # effects that were left out have one
         if stresses is not None:
             guessed = 0.0 if "fibre" in effect.needs else found.stress
             found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is

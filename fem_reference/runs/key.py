@@ -60,7 +60,7 @@ def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
 
 @cache
 def imported(path: Path, package: Path) -> tuple[str, ...]:
-    """Names that the file at ``path`` imports from ``package``: modules, and what may be modules, without the package's name."""
+    """Names that the file at ``path`` imports from ``package``: modules, and members that may be modules, without its own name."""
     start, found = f"{package.name}.", list[str]()
     for node in ast.walk(_tree(path.read_bytes())):
         if isinstance(node, ast.Import):
@@ -76,7 +76,7 @@ def imported(path: Path, package: Path) -> tuple[str, ...]:
 
 
 def _tree(source: bytes) -> ast.AST:
-    """The imports of a ``source``; all of it where what looks like an import is none."""
+    """The imports of a ``source``; the whole of it where a text that looks like an import is not one."""
     try:
         return ast.parse(b"\n".join(_IMPORT.findall(source)))
     except SyntaxError:

@@ -46,8 +46,8 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, eq=False)
 class Results:
     """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3): the unit vector
-    along the fibres at the middle of each tet, where known. The solution has one at every quadrature point: in a bar of 6 mm tets
-    the two differ by 2 degrees, root mean square. ``regions``: by name those in which effects act.
+    along the fibres at the middle of each tet, where known; the solver uses directions at quadrature points, which differ from
+    these by 2 degrees, root mean square, in a bar of 6 mm tets. ``regions``: by name those in which effects act.
     """
 
     mesh: TetMesh
@@ -232,7 +232,7 @@ class _Places:
                 yield "in_situ", self._at_rest(whole)
 
     def _at_rest(self, state: State) -> Any:
-        """The energy per rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 of another."""
+        """The energy per rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 for any other body."""
         if not len(self.state.response):
             return 0.0
         slopes = self._moved(self.state.response)[1] - np.eye(3)
@@ -243,7 +243,7 @@ class _Places:
         return in_situ.balancing(state, [list(row) for row in np.moveaxis(slopes, 0, -1)], pressure, shear)
 
     def _state(self, F: Sequence[Sequence[Any]], functions: Functions) -> State:
-        """The points as effects see them, with the entries of ``F`` as numbers or variables."""
+        """The state of the points for effects, with the entries of ``F`` as numbers or variables."""
         state = self.state
         passed = state.before if len(state.before) else np.zeros_like(state.displacement)
         before, F_before = self._moved(passed)
@@ -263,9 +263,7 @@ class _Places:
 
 @cache
 def _rule() -> tuple[Floats, Floats]:
-    """Barycentric coordinates (27, 4) and shares of the volume (27,) of a rule that is exact to degree 5: Gauss-Jacobi points on
-    lines to one corner, on those of the opposite side to another, and along its edge (Stroud 1971, conical product).
-    """
+    """Barycentric coordinates (27, 4) and shares (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
     (u, a), (v, b), (w, c) = (scipy.special.roots_jacobi(3, power, 0) for power in (2, 1, 0))
     x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
     rest = (1 - x) * (1 - y)
@@ -292,7 +290,10 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
         return barycentric, gradients
     nodes = reference_nodes("tetrahedron", 2)
     near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
-    i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)  # the corners around each node; at a corner, it twice
+    i, j = (
+        near.argmax(axis=1),
+        3 - near[:, ::-1].argmax(axis=1),
+    )  # the corners around each node; at a corner, that one twice
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]
     slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])

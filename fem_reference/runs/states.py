@@ -132,9 +132,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays of an .npz file by name: those of ``names``, by default all, and of ``also`` those that are there; InputError
-    where it is damaged.
-    """
+    """The arrays ``names``, by default all, of an .npz file, and those of ``also`` that exist; InputError where it is damaged."""
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:
@@ -153,7 +151,7 @@ def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] =
 class NodalField:
     """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the middles of
     ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, where a solver computes one.
-    ``form``: the weak form that was solved. After a failure psi is not-a-number.
+    ``form``: the weak form that was solved. After a failure psi is NaN.
     """
 
     mesh: FieldMesh

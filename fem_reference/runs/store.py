@@ -46,7 +46,7 @@ class Frame:
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm],
     newton_iterations, cut_backs. Of the reference also, where all energy is stored, energy_gap since the last frame
-    (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoid leaves much); where the tangent is symmetric,
+    (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoidal rule is poor); where the tangent is symmetric,
     negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
     max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
     number of cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa]
@@ -77,7 +77,7 @@ Sink = Callable[[Frame], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a solve: a status, a sentence for people, and the cost (seconds by phase ``seconds_...``, counts)."""
+    """The outcome of a solve: a status, a sentence for people, and the cost (seconds by phase ``seconds_...``, counts)."""
 
     status: Status
     message: str
@@ -155,7 +155,6 @@ class Run:
         return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(point(centre), self.force(bone))
 
     def _repr_html_(self) -> str:
-        """The run as notebooks display it."""
         known = ("seconds", "newton_iterations", "unknowns")
         cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {
@@ -228,7 +227,7 @@ def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> di
     check_corners(surface)
     found: dict[str, Any] = {"surface": surface, "positions": positions, "has_surface": has_surface}
     if "fibres" in parts:
-        lines = [files.read_moved_polylines(folder / "fibres" / file, 1.0) for file in names]
+        lines = [files.read_polylines(folder / "fibres" / file, 1.0, moved=True) for file in names]
         fibres = lines[0] if has_surface else files.read_polylines(folder / "rest" / "fibres.vtp", 1.0)
         _check_same(folder / "fibres", names, [line.points for line in lines], fibres.points)
         found |= {"fibres": fibres, "fibre_positions": np.stack([line.points for line in lines])}
@@ -266,7 +265,7 @@ def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
 
 
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:
-    """The run over exactly the frames ``numbers``; frames that were not reached are not-a-number, so they never pass."""
+    """The run over exactly the frames ``numbers``; frames that were not reached are NaN, so they never pass."""
     if run.numbers == numbers:
         return run
     pick = partial(at_numbers, run, numbers=numbers)

@@ -1,4 +1,4 @@
-"""Stresses in a state in few numbers, mean and quantiles over the volume, which a run keeps as scalars of a frame."""
+"""Statistics of the stresses in a state, means and quantiles over the volume, which a run stores as scalars of a frame."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fem_reference.runs.results import Results
 
 # Statistics by kind of stress. No greatest value: at the rim of an attachment it grows without bound with smaller tetrahedra.
 STATISTICS = {"along_fibres": ("mean", "p95"), "von_mises": ("mean", "p95"), "pressure": ("mean", "p05", "p95")}
-_MOST = 8192  # tetrahedra that are looked at, evenly spread
+_MOST = 8192  # tetrahedra that are evaluated, evenly spread
 # Barycentric coordinates of four points, of equal shares of the volume: exact to degree 2 (Hammer and Stroud 1956).
 _NEAR = (5 - 5**0.5) / 20
 _POINTS = np.full((4, 4), _NEAR) + (1 - 4 * _NEAR) * np.eye(4)
@@ -15,7 +15,7 @@ _POINTS = np.full((4, 4), _NEAR) + (1 - 4 * _NEAR) * np.eye(4)
 
 def stress_scalars(results: Results, frame: float) -> dict[str, float]:
     """The mean and quantiles [MPa] over the volume at rest by name, such as ``stress_von_mises_p95``, which 95 % of the volume do
-    not exceed: of the Cauchy stress at four points of each tetrahedron its part along the fibres, where they are known, the von
+    not exceed. The Cauchy stress at four points of each tetrahedron gives its part along the fibres, where they are known, the von
     Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN where a tetrahedron is inside out.
     """
     mesh = results.mesh

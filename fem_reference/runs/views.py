@@ -1,4 +1,4 @@
-"""Frames and runs of several muscles as those of one of them. Scalars of one muscle have its name before a dot."""
+"""Frames and runs of one of several muscles, taken from those of all. Scalars of one muscle have its name before a dot."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,10 +8,9 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem, Span
-from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Run
 
-# Scalars of all muscles together, which say nothing of one.
+# Scalars of all muscles together, which are left out for a single one.
 _OF_ALL = (
     "volume_ratio",
     "energy",
@@ -26,45 +25,43 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` of several muscles that is of one; the force of each of the ``others`` on it has the other's name."""
+    """The part of a ``frame`` of several muscles for one of them; a force of one of the ``others`` on it has the other's name."""
     assert frame.surface is not None  # of the reference
     assert frame.fibres is not None
     forces, moments = (
         {own: vector for key, vector in some.items() if (own := _own(key, span.name, others))}
         for some in (frame.forces, frame.moments)
     )
+    if (state := frame.state) is not None:
+        before = state.before[span.cells] if len(state.before) else state.before
+        displacement, pressure = state.displacement[span.cells], state.pressure[span.cells]
+        state = replace(state, before=before, displacement=displacement, pressure=pressure)
     return replace(
         frame,
         surface=frame.surface[span.vertices],
         fibres=frame.fibres[span.fibres],
         points=frame.points[span.points],
-        state=None if frame.state is None else _state_of(frame.state, span.cells),
+        state=state,
         forces=forces,
         moments=moments,
     )
 
 
 def force_between(name: str, other: str) -> str:
-    """The name, among forces, of that of a muscle by ``name`` on an ``other``."""
+    """The key of the force of the muscle ``name`` on an ``other``."""
     return f"{called(name, 'free')} on {called(other, 'free')}"
 
 
 def _own(key: str, name: str, others: tuple[str, ...]) -> str:
-    """The name that a force, by its ``key``, has for the muscle of a ``name``; empty where it is not on it."""
+    """The name of the force with a ``key`` in the run of the muscle ``name``; empty where it does not act on that muscle."""
     for other in others:
         if key == force_between(other, name):
             return other
     return key.removeprefix(f"{name} ") if key.startswith(f"{name} ") and not key.endswith(" free") else ""
 
 
-def _state_of(state: NodalState, cells: slice) -> NodalState:
-    """The state of some of the cells."""
-    before = state.before[cells] if len(state.before) else state.before
-    return replace(state, displacement=state.displacement[cells], pressure=state.pressure[cells], before=before)
-
-
 def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The ``runs`` of muscles by name, with the same frames, each with the others."""
+    """The ``runs`` of muscles by name, with the same frames, each with the others as ``others``."""
     return {
         name: replace(run, others={other: one for other, one in runs.items() if other != name})
         for name, run in runs.items()

@@ -26,7 +26,7 @@ from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
 
 RESTART = "restart"
-# Killed with the process that stores it, or alone, for example for lack of memory or disk space.
+# Statuses of a solve that was killed: with the process that stores it, or alone, for example for lack of memory or disk space.
 ENDED_EARLY = ("running", "crashed")
 
 
@@ -101,9 +101,7 @@ class Writer:
     """
 
     def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING, *, anew: bool = False) -> None:
-        """Begin a run of an ``identity``: name, solver, origin and requested frames, as in run.json; always ``anew`` where its
-        solver cannot continue it.
-        """
+        """Begin a run of an ``identity``, the first keys of run.json; ``anew`` where its solver cannot continue a stored one."""
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}

@@ -20,10 +20,10 @@ from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-# Further folders, divided as those of PATH are, that files which a scene file names may be in.
+# Further folders, separated as in PATH, that scene files may read files from.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 COMMAND = "command"  # the solver that runs a program, which a scene file cannot choose
-DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
+DELAUNAY = "delaunay"  # in place of the name of a file of triangles
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
@@ -107,7 +107,7 @@ class Case(Record):
     from_file: bool = Field(default=False, exclude=True)
     decisions: tuple[Any, ...] = Field(default=(), exclude=True)
 
-    # What a solver of it is asked for, what its runs have, the keys that determine its solution, and those of them that name files.
+    # The task of its solvers, the parts of its runs, the keys that determine its solution, and keys that name files.
     task: ClassVar[Literal["solve", "solve_field"]]
     carries: ClassVar[frozenset[Part]]
     determined_by: ClassVar[frozenset[str]]
@@ -120,7 +120,7 @@ class Case(Record):
 
     @property
     def parts(self) -> "tuple[Case, ...]":
-        """The muscles of a case of several, each as a case of its own; nothing else has any."""
+        """The muscles of a case of several, each as a case of its own; none for any other case."""
         return ()
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
@@ -130,7 +130,7 @@ class Case(Record):
     @property
     def acting(self) -> dict[str, Any]:
         """The effects by their names, distinct in this case."""
-        return {type(effect).__name__: effect for effect in self.effects}
+        return {getattr(effect, "title", type(effect).__name__): effect for effect in self.effects}
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -147,7 +147,6 @@ class Case(Record):
         raise NotImplementedError(f"{type(self).__name__} has no facts")
 
     def _repr_html_(self) -> str:
-        """The case as notebooks show it."""
         facts = self.facts | {
             "effects": ", ".join(self.acting),
             "reference": self.reference.solver,
@@ -180,9 +179,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read. A case
-        made by a program may read any file that the program may.
-        """
+        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
@@ -217,7 +214,7 @@ class Case(Record):
     @property
     def key(self) -> str:
         """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
-        the files that they name (not where these are) and that effects from outside the package are.
+        the files that they name, wherever these are, and of the files of effects outside the package.
         """
         tables = self.determining()
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]

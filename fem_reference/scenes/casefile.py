@@ -45,7 +45,7 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
 
 
 def _scene_file(case: str | Path) -> Path:
-    plain = Path(case).name == str(case)  # what is written as a path is no name
+    plain = Path(case).name == str(case)  # else it is a path and not a name
     shipped = [HOME / "cases" / str(case) / "case.toml"] if plain else []
     found = list[Path]()
     for path in (*shipped, Path(case) / "case.toml", Path(case)):
@@ -68,7 +68,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
         for part in parents:
             inside = inside[part]
         if not (add and last and isinstance(inside, dict)):
-            inside[last]  # a change replaces what is there
+            inside[last]  # a change replaces an existing value
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         want = f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}"
@@ -121,7 +121,7 @@ def muscle(case: Case, place: str | None = None) -> MuscleCase:
 
 
 def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Case:
-    """The ``case`` of ``table`` with its negative control applied; ``table`` stays as it is."""
+    """The ``case`` of ``table`` with its negative control applied; ``table`` is not changed."""
     place, control = str(path), case.negative_control
     if control is None:
         raise InputError(join(place, "negative_control"), "None", "a key to change, its value, and why")
@@ -142,7 +142,9 @@ def _check_negative_control(case: Case, changed: Case) -> None:
         return
     if changed.model_copy(update={"negative_control": control}) == case:
         raise _wrong(case, "value", f"a value that changes {control.key}")
-    raise _wrong(case, "key", "a key that changes what is solved, which alone can turn a verdict: of an effect, say")
+    raise _wrong(
+        case, "key", "a key that changes the solution, such as one of an effect: no other key can change a verdict"
+    )
 
 
 def _wrong(case: Case, part: str, want: str) -> InputError:
@@ -179,7 +181,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
 
 
 def _muscles(entries: list[Any], place: str) -> list[Any]:
-    """The muscles that are written below the key ``muscle``, with the effects of each as records."""
+    """The entries below the key ``muscle``, with the effects of each as records."""
     return [
         entry | {"effect": effects(entry["effect"], join(place, f"muscle[{i}]"))}
         if isinstance(entry, dict) and "effect" in entry
@@ -189,7 +191,7 @@ def _muscles(entries: list[Any], place: str) -> list[Any]:
 
 
 def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their units inside, checked as one of a file."""
+    """The ``case`` with other numbers by key, in their internal units, checked like a case from a file."""
     made = numbers.changed(case, values)
     _check_effects([name_of(one) for one in made.effect], made.effect, made.place)
     return _checked(made)
@@ -206,7 +208,7 @@ def _checked[C: Case](case: C) -> C:
 
 
 def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The effects of a ``kind`` that are written below the key ``effect``, each once; other values than lists unchanged."""
+    """The effects of a ``kind`` below the key ``effect``, each once; other values than lists unchanged."""
     if not isinstance(entries, list | tuple):
         return entries
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
@@ -216,8 +218,8 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """An effect acts once in each region (two of a name would share the unknowns that it brings), a load once on each part of the
-    surface. A bulk modulus below the shear modulus there belongs to no tissue, and is usually a mistake in units.
+    """Check that an effect acts once in each region (two of a name would share their unknowns), a load once on each part of the
+    surface, and that no bulk modulus is below the shear modulus there: no tissue has one, it is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]

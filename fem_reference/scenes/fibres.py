@@ -23,8 +23,8 @@ class PolylineFile(Record):
 class Traced(Record):
     """Fibres traced along the gradient of a Laplace field from the attachment ``start`` to ``end``.
 
-    With a ``flux`` by ``"area"`` the same flux passes each mm2 of an attachment, and fibres cover both. Without, the field is 0 on
-    the start and 1 on the end, and fibres gather at the rims of wide attachments.
+    With ``flux = "area"`` the flux per area of an attachment is constant, and fibres cover both attachments. Without it, the field
+    is 0 on the start and 1 on the end, and fibres are concentrated at the rims of wide attachments.
     """
 
     count: int = Field(gt=0, le=100_000)
@@ -78,11 +78,11 @@ class FibreTurn(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
 
-    ``turned``: the directions of the material are turned from those of these lines, by the same angle everywhere; lengths remain
-    those of the lines.
+    ``turned``: the fibre directions of the material are those of the lines, rotated by the same angle everywhere; the measured
+    lengths remain those of the lines.
 
-    ``complete``: ends more than 2 mm from their attachment, where that has no ``tendon``, are extended in the muscle or along its
-    surface to the nearest point of it.
+    ``complete``: ends more than 2 mm from an attachment without a ``tendon`` are extended, in the muscle or along its surface, to
+    the nearest point of the attachment.
     """
 
     polylines: PolylineFile | None = None

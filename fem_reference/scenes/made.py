@@ -20,7 +20,7 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
     A ``table`` with a ``domain`` is of a scalar field, else of a muscle. Where files have text with a unit, numbers in
     mm, N, MPa, s, rad and tonne do as well. Effects may be those of :func:`fem_reference.make_effect`. ``candidate``,
     ``expect`` and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the
-    ``name``. InputError where a key is missing, unknown or wrong names the key, what was got and what is wanted.
+    ``name``. InputError for a missing, unknown or wrong key names the key, the given value and the wanted one.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
         raise InputError("case", said(table), "keys and tables, as a case.toml has them")
@@ -33,7 +33,6 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
 
 
 def _effect(entry: Any) -> Any:
-    """An effect as the table that a file has."""
     if isinstance(entry, Record):
         values = {key: value for key, value in entry.model_dump(by_alias=True).items() if value is not None}
         entry = {"name": name_of(entry)} | values

@@ -16,7 +16,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.regions import CaseRegion
 
-# Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
+# [mm]: no grid resolves a smaller error of the distance to a bone, or a smaller rounding.
 _FINEST = 1e-3
 MOST_FRAMES = 100_000
 LAST_FRAME = 1_000_000_000
@@ -68,7 +68,7 @@ class Motion(Record):
 
 
 class CaseHalfSpace(Record):
-    """All that lies behind the plane through ``point`` across ``normal``, which points out of it."""
+    """The half-space behind the plane through ``point`` with the outward ``normal``."""
 
     point: Point
     normal: Annotated[Vector, AfterValidator(partial(directed, name="a normal"))]
@@ -119,9 +119,9 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: exactly one of a ``surface`` in a file, its coordinates in ``unit``, and the closed forms; without ``motion``
-    it rests. ``distance_error``: the error allowed in the distance to a surface, root mean square beside it, before
-    ``distance_rounding`` takes its Gaussian mean, of this standard deviation: on flat triangles nothing slides smoothly.
+    """A rigid body: exactly one of a ``surface`` in a file, its coordinates in ``unit``, and the closed forms; at rest without
+    ``motion``. ``distance_error``: the error allowed in the distance to a surface, root mean square near it, before rounding.
+    ``distance_rounding``: the standard deviation of a Gaussian mean of that distance, as nothing slides smoothly on flat triangles.
     """
 
     name: Name
@@ -141,7 +141,7 @@ class CaseBone(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.surface is None) != (self.unit is None):
-            raise ValueError('"unit" beside "surface" and only there')
+            raise ValueError('"unit" with "surface" and only with it')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
             if self.surface is None and key in self.model_fields_set:
                 raise ValueError(f'"{key}" beside "surface" only: a closed form has none')
@@ -186,7 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves those, but no fibres."""
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves the clouds alone."""
 
     file: str
     unit: LengthUnit
@@ -204,9 +204,9 @@ class Landmarks(Record):
 
 
 class Attachment(Record):
-    """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the
-    bone) and ``outline``: with springs of a ``stiffness`` over its area, without it exactly. Fibres that end beside it continue as
-    a straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` makes it pull.
+    """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the bone) and
+    ``outline``: by springs of a ``stiffness`` over its area, or clamped without it. Fibres that end beside it continue as a
+    straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` makes it pull.
     """
 
     name: Name
@@ -252,40 +252,42 @@ class Uncertain(Range):
     key: str
 
 
-class MuscleCase(Case):
-    """The case of a muscle. Its key ``effects`` (``choice``) says whether all effects that are listed act, or those of
-    them that the case needs: "auto".
+class DrivenCase(Case):
+    """The case of one or several muscles driven by bones. Its key ``effects`` (``choice``) states whether all listed effects act,
+    or only those that the case needs: "auto".
     """
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
-    muscle: Muscle
+    muscle: Muscle | tuple[Muscle, ...]
     bone: tuple[CaseBone, ...] = Field(min_length=1)
     joint: tuple[CaseJoint, ...] = ()
-    attachment: tuple[Attachment, ...] = ()
-    region: tuple[CaseRegion, ...] = ()
-    fibres: Fibres
     frames: Frames
-    uncertain: tuple[Uncertain, ...] = ()
 
     task = "solve"
     carries = frozenset({"surface", "lines"})
-    determined_by = frozenset({"muscle", "bone", "attachment", "region", "fibres", "frames"})
     naming_files = frozenset({"surface", "file"})
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The effects, in the order of the file."""
-        return self.effect
-
-    @property
-    def acting(self) -> dict[str, Effect]:
-        """The effects by their names, distinct in this case."""
-        return {effect.title: effect for effect in self.effects}
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """The frame numbers wanted."""
         return self.frames.numbers
+
+
+class MuscleCase(DrivenCase):
+    """The case of a muscle."""
+
+    muscle: Muscle
+    attachment: tuple[Attachment, ...] = ()
+    region: tuple[CaseRegion, ...] = ()
+    fibres: Fibres
+    uncertain: tuple[Uncertain, ...] = ()
+
+    determined_by = frozenset({"muscle", "bone", "attachment", "region", "fibres", "frames"})
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects, in the order of the file."""
+        return self.effect
 
     @property
     def facts(self) -> dict[str, str]:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field
 
@@ -11,18 +11,20 @@ from fem_reference.effects import Effect
 from fem_reference.effects.touching import MuscleContact, among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Name, join
-from fem_reference.scenes.case import Case, Expectation
+from fem_reference.scenes.case import Expectation
 from fem_reference.scenes.fibres import Fibres
-from fem_reference.scenes.muscle import Attachment, CaseBone, CaseJoint, Frames, Muscle, MuscleCase
+from fem_reference.scenes.muscle import Attachment, DrivenCase, Muscle, MuscleCase
 from fem_reference.scenes.regions import CaseRegion
 
-# The keys of one muscle among several that are tables beside the muscle where it is alone.
+# Keys of one muscle among several; in the case of a single muscle they are keys of the case.
 BESIDE = ("attachment", "fibres", "region", "expect")
+# The keys of the case that the case of each muscle has too.
+_SHARED = ("proves", "choice", "bone", "joint", "frames", "reference", "candidate", "folder", "from_file")
 
 
 class MuscleOfSeveral(Muscle):
-    """One of several muscles: its ``name``, which is also in the names of its forces, and all that is its own. ``effect``: those
-    that act in it, besides those of the case; ``expect``: what is expected of it.
+    """One of several muscles: its ``name``, which is also in the names of its forces, and its own tables. ``effect``: those that
+    act in it, besides those of the case; ``expect``: its expectations.
     """
 
     name: Name
@@ -33,24 +35,12 @@ class MuscleOfSeveral(Muscle):
     expect: tuple[Expectation, ...] = ()
 
 
-class MusclesCase(Case):
-    """The case of several muscles. Its key ``effects`` (``choice``) is as that of a muscle's case; ``effect`` acts on all."""
+class MusclesCase(DrivenCase):
+    """The case of several muscles; ``effect`` acts on all."""
 
-    choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
     muscle: tuple[MuscleOfSeveral, ...] = Field(min_length=2)
-    bone: tuple[CaseBone, ...] = Field(min_length=1)
-    joint: tuple[CaseJoint, ...] = ()
-    frames: Frames
 
-    task = "solve"
-    carries = MuscleCase.carries
     determined_by = frozenset({"muscle", "bone", "frames"})
-    naming_files = MuscleCase.naming_files
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """The frame numbers wanted."""
-        return self.frames.numbers
 
     @property
     def touching(self) -> MuscleContact | None:
@@ -83,8 +73,8 @@ class MusclesCase(Case):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine its solution, without what is expected of it; and that its second check asks whether muscles
-        cross, where no effect says it.
+        """The keys that determine its solution, without expectations; with ``apart`` where the second check has to test whether
+        muscles cross and no effect states it.
         """
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
@@ -115,7 +105,7 @@ class MusclesCase(Case):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The ``key`` of the muscle of number ``i`` as a case, as that of the scene: effects of all come before its own."""
+        """The key in the scene of a ``key`` in the case of the muscle of number ``i``, where effects of all come before its own."""
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):
@@ -129,33 +119,16 @@ class MusclesCase(Case):
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:
-        """Each muscle as a case of its own, in which the others are not there."""
-        return tuple(self._parts())
-
-    def _parts(self) -> Iterator[MuscleCase]:
-        """The cases, which were checked as this one was read."""
-        everywhere = tuple(one for one in self.effect if not isinstance(one, MuscleContact))
+        """Each muscle as a case of its own, without the others; they were checked when this case was read."""
+        everywhere, found = tuple(one for one in self.effect if not isinstance(one, MuscleContact)), list[MuscleCase]()
         for i, muscle in enumerate(self.muscle):
-            own = {name: getattr(muscle, name) for name in BESIDE}
-            alone = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})
-            yield MuscleCase.model_construct(
-                None,
-                title=f"{self.title}: {muscle.name}",
-                name=f"{self.name}_{muscle.name}",
-                proves=self.proves,
-                choice=self.choice,
-                effect=(*everywhere, *muscle.effect),
-                muscle=alone,
-                bone=self.bone,
-                joint=self.joint,
-                frames=self.frames,
-                reference=self.reference,
-                candidate=self.candidate,
-                folder=self.folder,
-                place=join(self.place, f"muscle[{i}]"),
-                from_file=self.from_file,
-                **own,
-            )
+            made: dict[str, Any] = {name: getattr(self, name) for name in _SHARED}
+            made |= {name: getattr(muscle, name) for name in BESIDE}
+            made["muscle"] = Muscle.model_construct(**{name: getattr(muscle, name) for name in Muscle.model_fields})
+            made |= {"title": f"{self.title}: {muscle.name}", "name": f"{self.name}_{muscle.name}"}
+            made |= {"effect": (*everywhere, *muscle.effect), "place": join(self.place, f"muscle[{i}]")}
+            found.append(MuscleCase.model_construct(None, **made))
+        return tuple(found)
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:

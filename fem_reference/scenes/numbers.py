@@ -32,7 +32,7 @@ def canonical(key: str) -> str:
 
 
 def number(case: Case, key: str) -> float:
-    """The number of a ``case`` at a ``key``, in its unit inside; InputError where there is none."""
+    """The number of a ``case`` at a ``key``, in its internal unit; InputError where there is none."""
     found = _along(case, key)[-1]
     if isinstance(found, bool) or not isinstance(found, float | int):
         got = "no value" if found is None else f"{type(found).__name__}"
@@ -41,12 +41,12 @@ def number(case: Case, key: str) -> float:
 
 
 def unit(case: Case, key: str) -> str:
-    """The unit inside of the number at a ``key``; empty where it has none."""
+    """The internal unit of the number at a ``key``; empty where it has none."""
     return field_unit(_field(case, key))
 
 
 def read(case: Case, key: str, value: str | float) -> float:
-    """A ``value`` for the number at a ``key``, as scene files write it or in its unit inside; InputError where it has none."""
+    """A ``value`` for the number at a ``key``, as in scene files or in its internal unit; InputError where it is not valid."""
     field = _field(case, key)
     kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     try:
@@ -59,8 +59,8 @@ def read(case: Case, key: str, value: str | float) -> float:
 
 
 def changed[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their units inside; each, and each record that it is in, is checked as in a scene
-    file. Checks of records beside each other follow in :func:`fem_reference.scenes.casefile.with_numbers`.
+    """The ``case`` with other numbers by key, in their internal units; each number and the records around it are checked as in a
+    scene file. Checks between records follow in :func:`fem_reference.scenes.casefile.with_numbers`.
     """
     for key, value in values.items():
         found: Any = read(case, key, value)
@@ -92,7 +92,7 @@ def _in_file(field: Any, value: Any) -> Any:
 
 
 def title(case: Case, key: str) -> str:
-    """A ``key`` in words: an effect by its name, what has a name by that; ``neo_hooke mu`` for ``effect[0].mu``."""
+    """A ``key`` in words: effects and other entries by their names; ``neo_hooke mu`` for ``effect[0].mu``."""
     words = list[str]()
     for part, inside in zip(parts(key), _along(case, key)[1:], strict=True):
         if isinstance(inside, Effect):
@@ -105,7 +105,7 @@ def title(case: Case, key: str) -> str:
 
 
 def _field(case: Case, key: str) -> Any:
-    """The field of a record that the number at a ``key`` is in."""
+    """The field of a record that contains the number at a ``key``."""
     number(case, key)
     owner, name = _along(case, key)[-2], parts(key)[-1]
     if not isinstance(owner, Record):
@@ -114,17 +114,13 @@ def _field(case: Case, key: str) -> Any:
 
 
 def _along(case: Case, key: str) -> list[Any]:
-    """The ``case`` and all that the parts of a ``key`` lead to, one inside the other; InputError where they lead nowhere."""
+    """The ``case`` and the values along the parts of a ``key``, each inside the one before; InputError where one does not exist."""
     found: list[Any] = [case]
     for part in parts(key):
         inside = found[-1]
-        known = isinstance(inside, tuple) and part < len(inside) if isinstance(part, int) else part in _names(inside)
+        fields = getattr(type(inside), "model_fields", ())
+        known = isinstance(inside, tuple) and part < len(inside) if isinstance(part, int) else part in fields
         if not known:
             raise InputError(join(case.place, key), "nothing", "the key of a number that this case has")
         found.append(inside[part] if isinstance(part, int) else getattr(inside, part))
     return found
-
-
-def _names(inside: Any) -> set[str]:
-    """The keys of a record."""
-    return set(type(inside).model_fields) if isinstance(inside, Record) else set()

@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Numbers beside those of effects with which all runs are measured alike: on the lines, bones and frames of the case.
+# Numbers besides those of effects that leave the measurement of runs unchanged: the lines, bones and frames of the case.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
@@ -17,7 +17,7 @@ _VARIED = (
 
 
 def ranges(case: MuscleCase) -> dict[str, Range]:
-    """The ranges by key: the published ones of the parameters of its effects, and in their place or beside them its own."""
+    """The ranges by key: the published ones of the parameters of its effects, and its own, which replace these."""
     stated = {
         f"effect[{i}].{name}": one for i, effect in enumerate(case.effects) for name, one in effect.published.items()
     }
@@ -39,7 +39,7 @@ def left_out(case: MuscleCase) -> list[str]:
 
 
 def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
-    """The ends of a range of the number at a ``key``, in its unit inside; InputError at ``place`` where they are not numbers."""
+    """The ends of a range of the number at a ``key``, in its internal unit; InputError at ``place`` where they are not numbers."""
     found = []
     for name in ("low", "high"):
         try:
@@ -59,7 +59,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
 
 
 def check(case: MuscleCase) -> None:
-    """InputError where a range that a ``case`` states is of no number of it, or has no ends."""
+    """InputError where a ``case`` states a range for a key that is not a number of it, or with invalid ends."""
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")

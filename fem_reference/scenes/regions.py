@@ -1,6 +1,7 @@
 """The regions of a muscle in a case, in which effects act: tendons, aponeuroses, fat, compartments."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -42,7 +43,7 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """All where the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
+    """The part in which the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
 
     start: str
     end: str
@@ -59,11 +60,11 @@ class ShareOfField(Record):
 
 class CaseRegion(Record):
     """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface``, ``tets``
-    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are one.
+    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are united.
     """
 
     name: Name
-    width: Length
+    width: Annotated[Length, Field(ge=0)]
     attachment: LengthFromAttachment | None = None
     patch: DepthBelowPatch | None = None
     surface: ClosedSurface | None = None
@@ -79,13 +80,6 @@ class CaseRegion(Record):
             raise ValueError(f'a name that does not begin with "{REST}", which stands for the rest of the muscle')
         return name
 
-    @field_validator("width")
-    @classmethod
-    def _check_width(cls, width: float) -> float:
-        if not width >= 0:
-            raise ValueError("a length of 0 or more")
-        return width
-
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
     """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that does not exist, or one
@@ -96,10 +90,6 @@ def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments:
     ]
     check_used([one.name for one in regions], laws, place)
     for i, one in enumerate(regions):
-        near = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
-        ends = (
-            [(f"region[{i}].field.start", one.field.start), (f"region[{i}].field.end", one.field.end)]
-            if one.field
-            else []
-        )
-        check_used(attachments, near + ends, place)
+        named = [(f"region[{i}].attachment.name", one.attachment.name)] if one.attachment else []
+        named += [(f"region[{i}].field.{end}", getattr(one.field, end)) for end in ("start", "end") if one.field]
+        check_used(attachments, named, place)

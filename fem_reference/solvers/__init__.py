@@ -5,10 +5,10 @@ A file lists what it offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``
 """
 
 import importlib
-import pkgutil
 from typing import Any, Literal, overload
 
 from fem_reference.effects import Effect
+from fem_reference.foundations import modules
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
 from fem_reference.problems.problem import Task
@@ -20,8 +20,9 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 def names(task: Task | None = None) -> list[str]:
     """The names of all solvers in scene files, or of those for a ``task``."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    found = [name for name in found if name != "common" and not name.endswith("_kernels")]  # these serve solvers
+    found = [
+        name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")
+    ]  # these serve solvers
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 

@@ -18,6 +18,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite, 
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files, texts
+from fem_reference.io.formats import formats
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.case import Candidate
@@ -193,7 +194,7 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
     elif source.suffix.lower() == ".pvd":
         entries = ((_number(time, interval), path.name, path) for time, path in files.read_pvd(source))
     else:
-        meshes = [path for path in _visible(source) if path.suffix.lower() in files.surface_suffixes()]
+        meshes = [path for path in _visible(source) if path.suffix.lower() in formats()]
         last = {path: re.findall(r"\d+", path.stem)[-1:] for path in meshes}  # digits of their names
         entries = ((int(digits[0]), path.name, path) for path, digits in last.items() if digits)
     found: dict[int, tuple[str, Path | Surface]] = {}

@@ -4,7 +4,6 @@ import importlib
 import logging
 import math
 import os
-import pkgutil
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -19,6 +18,7 @@ from types import ModuleType
 
 from fem_reference import verification
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, Result, result
+from fem_reference.foundations import modules
 from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, 
 
 def entries() -> dict[str, Entry]:
     """The catalogue: every entry by its name, in the order of the files and in each of its ``ENTRIES``."""
-    names = sorted(module.name for module in pkgutil.iter_modules(verification.__path__))
+    names = modules.names(verification.__path__)
     return collect(importlib.import_module(f"{verification.__name__}.{name}") for name in names)
 
 

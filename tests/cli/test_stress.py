@@ -57,4 +57,4 @@ def test_a_program_of_somebody_else_is_judged_where_it_takes_what_acts(tmp_path,
         ("still", "ok"),
         ("still", "not applicable"),
     ]
-    assert "it leaves out what acts here: contact" in found["cells"][1]["sentence"]
+    assert "it leaves out effects of this case: contact" in found["cells"][1]["sentence"]

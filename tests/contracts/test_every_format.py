@@ -18,7 +18,7 @@ from fem_reference.io.formats import formats, vtk
 
 WRITTEN_BY_US = [suffix for suffix, one in formats().items() if one.write]
 BALL = shapes.sphere(2, 30.0)  # 162 vertices that float32 cannot hold, 320 triangles
-UNREADABLE = f"want a triangle surface, whole, as {' '.join(files.surface_suffixes())}"
+UNREADABLE = f"want a triangle surface, whole, as {' '.join(formats())}"
 
 # Every format and kind of it, written by meshio, and how far its coordinates may be from ours [mm]: nothing where it
 # holds float64 or all its digits, and half a unit in the last place of float32 at 30 mm (1e-6) for binary STL.

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from fem_reference import export
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export import febio, febio_several
 from fem_reference.problems import of_case
 from fem_reference.problems.muscles import MusclesProblem
@@ -114,6 +116,33 @@ def test_muscles_that_rub_rub_in_febio(problem: MusclesProblem) -> None:
     rubbing = replace(problem, law=problem.law.model_copy(update={"friction": 0.3}))
     contacts = {one.get("surface_pair"): one for one in febio_several.model(rubbing).iter("contact")}
     assert {one.tag: one.text for one in contacts["touching_0_deep_superficial_pair"]}["fric_coeff"] == "0.3"
+
+
+def test_a_muscle_with_a_region_has_its_materials_beside_those_of_the_other(problem: MusclesProblem) -> None:
+    deep = problem.problems["deep"]
+    acting = tuple(
+        effect.model_copy(update={"region": region})
+        for effect in deep.effects
+        for region in (("end", "not end") if isinstance(effect, NeoHooke | Incompressible) else ("",))
+    )
+    stiffer = tuple(
+        one.model_copy(update={"mu": 1.0}) if getattr(one, "mu", 0) and one.region == "end" else one for one in acting
+    )
+    regions = {"end": lambda points: np.where(points[:, 0] > 80, 1.0, 0.0)}
+    several = replace(problem, problems=problem.problems | {"deep": replace(deep, effects=stiffer, regions=regions)})
+    feb = febio_several.model(several)
+    domains = {one.get("name"): one.get("mat") for one in feb.iter("SolidDomain")}
+    names = [name for name in domains if name.startswith("deep_muscle_")]
+    assert len(names) > 2
+    assert set(domains) == {*names, "superficial_muscle"}
+    assert set(domains.values()) <= {one.get("name") for one in feb.iter("material")}
+    constants = {
+        one.get("name"): float(one.findtext("c1")) for one in feb.iter("material") if one.find("c1") is not None
+    }
+    assert 2 * max(constants.values()) == pytest.approx(1.0)
+    assert 2 * constants["superficial_muscle"] == pytest.approx(0.01)
+    for tag in ("node", "elem", "material"):
+        assert numbers(list(feb.iter(tag))) == list(range(1, len(list(feb.iter(tag))) + 1))
 
 
 def test_each_muscle_has_a_folder_that_is_complete(folder: Path) -> None:

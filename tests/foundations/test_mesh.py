@@ -161,7 +161,7 @@ UNUSABLE = {
         np.concatenate([CORNER, CORNER[:1] + 2]),
         np.array([*FAN, [1, 4, 3], [3, 4, 1]]),
     ),
-    "3 edges that both their triangles run in the same direction": (
+    "3 edges along which both triangles have the same direction": (
         CORNER,
         np.array([TET_FACES[0][::-1], *TET_FACES[1:]]),
     ),

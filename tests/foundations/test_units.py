@@ -5,6 +5,7 @@ Conversions are powers of ten and pi / 180, so that only rounding separates them
 
 import math
 
+import pint
 import pytest
 
 from fem_reference.foundations import units
@@ -160,3 +161,13 @@ def test_length_unit() -> None:
 def test_length_unit_refuses_what_is_none(text: object, want: str) -> None:
     with pytest.raises(ValueError, match=f"^{want}"):
         length_unit(text)
+
+
+def test_common_units_are_those_of_pint_to_the_last_digit() -> None:
+    registry = pint.UnitRegistry(cache_folder=None)
+    kinds = {kind.unit for kind in units.KINDS.values()}
+    for (unit, inside), factor in units.COMMON.items():
+        assert inside in kinds
+        one = registry.Quantity(1.0, registry.parse_units(unit))
+        assert one.to(inside or "dimensionless").magnitude == factor, unit
+        assert one.to_root_units().units == registry.Quantity(1.0, inside).to_root_units().units, unit

@@ -152,7 +152,7 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
         "dirty.ply: fTetWild meshes it, differently each time, for gmsh cannot: 12 triangles pass through"
         in caplog.text
     )
-    assert "dirty.ply: 12 triangles of the given surface pass through it" in caplog.text
+    assert "dirty.ply: 12 triangles of the given surface intersect others" in caplog.text
     assert mesh.maker == "fTetWild"
     assert mesh.facets == {}
     assert_allclose(tet_volumes(mesh.points, mesh.tets).sum(), enclosed_volume(points, ball.triangles), rtol=0.05)
@@ -208,7 +208,7 @@ def test_what_gmsh_says_is_passed_on() -> None:
 
 @pytest.mark.parametrize(
     ("code", "said", "words"),
-    [(-11, "", "it crashed with signal 11"), (1, "one\ntwo\n", "two"), (1, "", "without a word")],
+    [(-11, "", "it crashed with signal 11"), (1, "one\ntwo\n", "two"), (1, "", "no message")],
 )
 def test_the_last_words_of_a_mesher(code: int, said: str, words: str) -> None:
     assert tetrahedra.last_words(subprocess.CompletedProcess([], code, "", said)) == words

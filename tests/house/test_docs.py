@@ -24,6 +24,7 @@ from fem_reference.foundations.records import keys, parse
 from fem_reference.runs.contents import Status
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers.fenicsx import processes
 
@@ -86,7 +87,7 @@ def test_every_key_of_every_record_is_in_the_reference() -> None:
         for record in records:
             section = next(part for part in text.split("### ") if _said(record) in part)
             assert re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE) == keys(record), record
-    assert {MuscleCase, ScalarCase} < set(reference_pages.scene_records())
+    assert {MuscleCase, MusclesCase, ScalarCase} < set(reference_pages.scene_records())
     assert sorted(reference_pages.effect_records()) == effects.names(reference_pages.Record)
     for name, records in reference_pages.solver_records().items():
         assert {offer.settings for offer in solvers.offers(name)} <= set(records)

@@ -77,3 +77,22 @@ def test_what_would_be_planted_is_named(monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.setattr("sys.argv", ["faults.py", "--list", "--stale"])
     assert faults.main() == 0
     assert capsys.readouterr().out == f"{faults.key(faults.FAULTS[0])}: {faults.FAULTS[0].tests}\n"
+
+
+def test_a_record_stands_while_statements_are_the_same(project: Path) -> None:
+    """Words and layout may change; a number may not, nor the statements of its tests."""
+    fault, law, test = (
+        Fault("one", "law.py", "a + b", "a - b", "test_law"),
+        project / "law.py",
+        project / "tests/test_law.py",
+    )
+    text, found = law.read_text(), faults.fingerprint(project, fault)
+    law.write_text(
+        '"""The law."""\n\n' + text.replace(":\n", ':  # words\n    """The law."""\n').replace("b):", "b,\n):")
+    )
+    assert faults.fingerprint(project, fault) == found
+    law.write_text(text.replace("= 7", "= 8"))
+    assert faults.fingerprint(project, fault) != found
+    law.write_text(text)
+    test.write_text(test.read_text().replace("== 5", "== 6"))
+    assert faults.fingerprint(project, fault) != found

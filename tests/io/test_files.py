@@ -108,12 +108,12 @@ def test_what_a_solver_made_of_lines_is_read(tmp_path: Path) -> None:
     lines = Polylines(MOVED[:4], np.array([0, 2, 4]))
     moved = np.array([[np.nan] * 3, [np.inf] * 3, [1.0, 2, 3], [1.0, 2, 3]])
     files.write_polylines(path, lines, moved)
-    assert np.array_equal(files.read_moved_polylines(path, 1.0).points, moved, equal_nan=True)
+    assert np.array_equal(files.read_polylines(path, 1.0, moved=True).points, moved, equal_nan=True)
     with pytest.raises(InputError, match=r"moved\.vtp: got a point that is not finite \(point 0\)"):
         files.read_polylines(path, 1.0)
     (tmp_path / "cells.vtk").write_text(segments([0, 9]))
     with pytest.raises(InputError, match=r"cells\.vtk: got cell 0 with a point that does not exist"):
-        files.read_moved_polylines(tmp_path / "cells.vtk", 1.0)
+        files.read_polylines(tmp_path / "cells.vtk", 1.0, moved=True)
 
 
 def test_an_index_comes_back(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body, ByCell, Cells, Prescribed, boundary_facets
+from fem_reference.problems.body import Body, ByCell, Cells, Prescribed, outer_facets
 from fem_reference.problems.checks import check
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.problems.finer import finer
@@ -45,7 +45,7 @@ def test_a_box_becomes_the_box_of_twice_as_many_cells_along_its_edges(kind, degr
         axis, end = "xyz".index(name[0]), int(name[1])
         assert len(middles) == len(facets)
         assert_allclose(middles[:, axis], end * SIZE[axis], atol=1e-12)
-    assert len(boundary_facets(fine.mesh)) == sum(map(len, fine.mesh.facets.values()))
+    assert len(outer_facets(fine.mesh)[0]) == sum(map(len, fine.mesh.facets.values()))
 
 
 def test_parts_of_tetrahedra_are_upright_and_fill_them() -> None:

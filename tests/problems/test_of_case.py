@@ -31,7 +31,7 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
     itself = make_effect("touching", stiffness=0.1, smoothing=0.1)
     decided = estimates.Decision(itself, needed=True, indicator=None, bound=0.1, stress_bound=0.1)
-    assert str(decided) == "MuscleContact: kept, as no estimate tells what meets"
+    assert str(decided) == "MuscleContact: kept, as no estimate shows what touches"
 
 
 def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:

@@ -109,14 +109,14 @@ def test_what_a_case_says_of_regions_is_checked(tmp_path) -> None:
     unknown = {"name": "neo_hooke", "mu": "1 kPa", "in": "fat"}
     for tables, effects, message in (
         ([AT_END], (unknown, VOLUME), r'effect\[0\]\.in: got "fat", want one of tendon'),
-        ([], (SOFT, VOLUME), r'effect\[0\]\.in: got "tendon", want a name that is there'),
+        ([], (SOFT, VOLUME), r'effect\[0\]\.in: got "tendon", want none, as none is defined'),
         (
             [AT_END | {"attachment": {"name": "top", "length": "8 mm"}}],
             (VOLUME,),
             r"region\[0\]\.attachment\.name: got .top",
         ),
         ([AT_END | {"name": "not me"}], (VOLUME,), r"region\[0\]\.name: got .*does not begin with .not "),
-        ([AT_END | {"width": "-1 mm"}], (VOLUME,), r"region\[0\]\.width: got .*want a length of 0 or more"),
+        ([AT_END | {"width": "-1 mm"}], (VOLUME,), r"region\[0\]\.width: got .*want greater than or equal to 0"),
         ([AT_END | {"field": FIELD}], (VOLUME,), r"region\[0\]: got .*exactly one of"),
         ([AT_END], (SOFT, SOFT, VOLUME), r'effect\[1\]\.name: got "neo_hooke" in "not tendon" a second time'),
         ([AT_END], (SOFT, STIFF, VOLUME | {"bulk": "10 kPa"}), r"at least the shear modulus"),

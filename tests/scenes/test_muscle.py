@@ -45,7 +45,7 @@ WRONG = [
 def test_attachments_may_be_none(bar: Path) -> None:
     start, end = SCENE.index("[[attachment]]"), SCENE.index("[[effect]]")
     text = SCENE[:start] + SCENE[end:]
-    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want a name that is there: there is none'):
+    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want none, as none is defined'):
         casefile.read(written(bar, text))
     traced = text[text.index("[fibres.traced]") : text.index("[frames]")]
     lines = 'fibres.polylines = { file = "fibres.vtk", unit = "mm" }\n'
@@ -58,9 +58,10 @@ def test_attachments_may_be_none(bar: Path) -> None:
 
 def test_loads_of_a_kind_act_on_different_parts(bar: Path) -> None:
     tables = [{"name": "neo_hooke", "mu": "1 kPa"}, PRESSURE, PRESSURE | {"on": "end"}]
-    scene = changed(bar, "effect", tables)
+    soft = {"attachment[1].stiffness": "1 MPa/mm"}
+    scene = casefile.read(bar, changes=soft | {"effect": tables})
     assert [effect.title for effect in scene.effects] == ["NeoHooke", "Pressure on free", "Pressure on end"]
-    assert scene.key != changed(bar, "effect", tables[:2]).key
+    assert scene.key != casefile.read(bar, changes=soft | {"effect": tables[:2]}).key
 
 
 @pytest.mark.parametrize(("key", "value", "message"), WRONG, ids=lambda entry: str(entry)[:40])
@@ -152,8 +153,8 @@ WRONG_BONES = [
     ),
     ("bone[0]", {"name": "wall"}, "bone[0]: got {'name': 'wall'}, want exactly one of \"surface\", \"half_space\""),
     ("bone[0]", {"name": "wall", "surface": "wall.ply"}, "bone[0]: got {"),
-    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" beside "surface" and only there'),
-    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" beside "surface" and only there'),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" with "surface" and only with it'),
+    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" with "surface" and only with it'),
     (
         "bone[0]",
         {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},

@@ -36,7 +36,7 @@ WRONG = [
         5,
         "negative_control.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure",
     ),
-    ("negative_control", TITLE, 'negative_control.key: got "title", want a key that changes what is solved'),
+    ("negative_control", TITLE, 'negative_control.key: got "title", want a key that changes the solution'),
     (
         "negative_control",
         TITLE | {"key": "expect[0].truth", "value": "9 %"},

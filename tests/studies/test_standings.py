@@ -183,10 +183,10 @@ def test_a_program_states_its_group_and_law() -> None:
     ("law", "message"),
     [
         (
-            'law = "corotated"',
-            'still/candidate.toml: law: got "corotated", want squared_invariants, st_venant_kirchhoff',
+            'law = "hooke"',
+            'still/candidate.toml: law: got "hooke", want corotated, squared_invariants, st_venant_kirchhoff',
         ),
-        ('law = "contact"', 'law: got "contact", want squared_invariants'),
+        ('law = "contact"', 'law: got "contact", want corotated'),
         ('law = "stable_neo_hooke"', "candidate.toml: settings.poisson: got nothing, want the Poisson's ratio"),
     ],
 )

@@ -5,12 +5,12 @@ bit, and a truncated file is refused.
 """
 
 import importlib
-import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from fem_reference.foundations import modules
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.io.soup import Soup
 
@@ -20,8 +20,8 @@ class Format:
     """A mesh format, known by the ``suffixes`` of its files, lower case, with their dots.
 
     ``read``: points and triangles as in the file; raises any exception where the file is incomplete. ``write``: the surface
-    as it is, with its displacement (n, 3) [mm] where the format has room for it; None where the format can only be read.
-    ``shares_points``: whether triangles index a common list of points, whose order is kept; else each has three of its own.
+    and its displacement (n, 3) [mm], if the format has point data; None where the format can only be read.
+    ``shares_points``: whether triangles index a common list of points, whose order is kept; else each has three own points.
     ``states_size``: whether a file states its size; else truncation between two of its lines goes unnoticed.
     """
 
@@ -34,9 +34,9 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format, by the suffix of its files; TypeError where a module defines none, or a suffix that another has."""
+    """Every format, by the suffix of its files; TypeError where a module defines none, or the suffix of another."""
     found: dict[str, Format] = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")):
+    for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")
         if not isinstance(one, Format) or not one.suffixes:
             raise TypeError(f"io/formats/{name}: FORMAT is {one!r}, want a Format with a suffix")

@@ -1,4 +1,4 @@
-"""VTK's legacy format, text or binary, read with numpy alone: no array is made that the file has no bytes for."""
+"""VTK's legacy format, text or binary, read with numpy alone: no array is larger than the bytes of the file allow."""
 
 import re
 from itertools import islice
@@ -22,9 +22,7 @@ _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; ValueError or another exception where it is none, or not whole. Sections other than points and cells
-    are skipped, to their end.
-    """
+    """The data set of a file, of which other sections are skipped; ValueError or another exception where it is incomplete."""
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no head of a VTK file")
@@ -57,7 +55,7 @@ class _File:
         self.data, self.at, self.text, self.values = data, at, text, "0"
 
     def line(self) -> list[str]:
-        """The words of the next line that has some; none at the end."""
+        """The words of the next line that is not empty; none at the end."""
         words = list[str]()
         while not words and self.at < len(self.data):
             end = self.data.find(b"\n", self.at)
@@ -103,14 +101,14 @@ class _File:
         return np.diff(np.asarray(offsets, np.int64)), corners
 
     def _named(self, name: str, count: str) -> Any:
-        """The array on whose line is a ``name`` and then its type."""
+        """The array after a line with its ``name`` and its type."""
         words = self.line()
         if words[:1] != [name]:
             raise ValueError(f"no {name} of cells")
         return self.array(count, words[1])
 
     def skip(self, name: str, words: list[str]) -> None:
-        """Go to the end of a section, which begins with a line of ``words``; ValueError where its arrays are not whole."""
+        """Skip a section, which begins with a line of ``words``; ValueError where its arrays are incomplete."""
         of_bytes = "float" if self.text else "unsigned_char"
         if name in ("POINT_DATA", "CELL_DATA"):
             self.values = words[1]

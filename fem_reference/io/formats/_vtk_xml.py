@@ -1,6 +1,6 @@
-"""VTK's XML formats, read with numpy alone: no array is made that the file has no bytes for.
+"""VTK's XML formats, read with numpy alone: no array is larger than the bytes of the file allow.
 
-VTK's own readers are native code that believes a file: a false number in it crashes or hangs the process.
+VTK's own readers are native code that trusts a file: a wrong number in it crashes or hangs the process.
 """
 
 import base64
@@ -27,7 +27,7 @@ _MOST = 2**28
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file, its pieces as one; ValueError or another exception where it is none, or not whole."""
+    """The data set of a file, its pieces as one; ValueError or another exception where it is invalid or incomplete."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
@@ -62,7 +62,7 @@ def _points(piece: Element, arrays: "_Arrays") -> Any:
 
 
 def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[Ints, Ints, Ints]:
-    """Sizes, corners and types of the cells of a piece with this ``name``, between so many points; polygons have no types."""
+    """Sizes, corners and types of the cells of a piece with this ``name``; ``points``: their number; polygons have no types."""
     count, found = _number_of(piece, name), {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
     wanted = ("offsets", "connectivity", *(["types"] if name == "Cells" else []))
     ends, corners, *types = (np.asarray(arrays.read(found[key]) if count else [], np.int64) for key in wanted)
@@ -73,7 +73,7 @@ def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[I
 
 
 class _Arrays:
-    """The arrays of a file with the ``root`` and what is ``appended`` to it, from behind the name of the element."""
+    """The arrays of a file with a ``root`` and ``appended`` data, which begin after the name of their element."""
 
     def __init__(self, root: Element, appended: bytes) -> None:
         self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
@@ -101,7 +101,7 @@ class _Arrays:
         return np.frombuffer(self._bytes(data, _decoded if encoded else _taken), self.order + kind)
 
     def _bytes(self, data: memoryview, take: Callable[[memoryview, int], bytes]) -> bytes:
-        """Bytes stored at the beginning of ``data``, behind a header with their length, or with those of compressed blocks."""
+        """Bytes stored at the beginning of ``data``, after a header with their length, or with those of compressed blocks."""
         size = self.header.itemsize
         if not self.compressor:
             (count,) = np.frombuffer(take(data, size), self.header).tolist()
@@ -131,7 +131,6 @@ def _taken(data: memoryview, count: int) -> bytes:
 
 
 def _decoded(data: memoryview, count: int) -> bytes:
-    """The first ``count`` bytes of what is base64."""
     return _taken(memoryview(base64.b64decode(_taken(data, 4 * -(-count // 3)), validate=True)), count)
 
 
@@ -139,12 +138,12 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
     import pyvista
     from vtkmodules.vtkIOCore import vtkLZ4DataCompressor
 
-    found = bytearray(min(wanted, 256 * len(packed)))  # no byte of LZ4 stands for more than 255
+    found = bytearray(min(wanted, 256 * len(packed)))  # a byte of LZ4 expands to at most 255
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 
 
-# Bytes from a block that should have so many: never more than one byte more.
+# The bytes of a packed block of a wanted length; at most one more, which shows that it is too long.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
     "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most + 1),
     "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most + 1),
@@ -153,7 +152,7 @@ _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
-    """The numbers of a text; ValueError where a word is none."""
+    """The numbers of a text; ValueError where a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:

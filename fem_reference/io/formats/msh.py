@@ -9,19 +9,19 @@ from typing import Any
 from fem_reference.io.formats import Format
 from fem_reference.io.soup import Soup, of_meshio
 
-# What follows the name of a section that declares how many nodes or elements it has: as text, or as up to four numbers in binary.
+# The declared number of nodes or elements after the name of a section: as text, or as up to four binary numbers.
 _DECLARED = re.compile(rb"\$(Nodes|Elements)\r?\n([\d \t]+(?=[\r\n])|.{32}|.{4})", re.DOTALL)
-# meshio looks beyond the end of a file once, to see that it is there.
+# The reads beyond the end of a file that meshio needs to find the end.
 _PAST_END = 2
 
 
 class _Ending(io.BufferedReader):
-    """A file that refuses to be read on and on beyond its end: meshio counts as far as a file says, whatever is in it."""
+    """A file that limits reads beyond its end: meshio loops over the declared numbers, whatever the file contains."""
 
     past = 0
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """The next line; ValueError where there has been none for a while."""
+        """The next line; ValueError after repeated reads beyond the end."""
         line = super().readline(size)
         self.past += not line
         if self.past > _PAST_END:
@@ -30,13 +30,13 @@ class _Ending(io.BufferedReader):
 
 
 def _read(path: Path) -> Soup:
-    """The triangles of a mesh; points and line cells are passed over."""
+    """The triangles of a mesh; points and line cells are skipped."""
     mesh = read_mesh(path)
     return of_meshio(mesh.points, mesh.cells)
 
 
 def read_mesh(path: Path) -> Any:
-    """The mesh as meshio has it."""
+    """The mesh as a ``meshio.Mesh``."""
     from meshio.gmsh.main import read_buffer
 
     _check_declared(path.read_bytes())
@@ -51,7 +51,7 @@ def _check_declared(data: bytes) -> None:
     for name, first in _DECLARED.findall(data):
         if binary and not old:
             numbers = [int.from_bytes(first[i : i + 8], "little") for i in (0, 8)]
-        else:  # of old files that number is a text whatever the rest is
+        else:  # in old files that number is text, even if the rest is binary
             numbers = [int(word[:20]) for word in first.split()[: 1 if old else 2] if word.isdigit()]
         if max(numbers, default=0) > len(data):
             raise ValueError(f"{name.decode()} that are more than the file has bytes")

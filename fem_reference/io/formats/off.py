@@ -8,7 +8,7 @@ from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
-    """Geomview OFF: text, counts, positions, faces; colours are passed over."""
+    """Geomview OFF: text, counts, positions, faces; colours are skipped."""
     text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
     parts = re.match(r"\s*C?N?OFF\s+(\d+)\s+(\d+)\s+\d+\s+(.*)", text, re.DOTALL)
     if parts is None:

@@ -58,8 +58,7 @@ def _element(body: bytes, count: int, properties: list[list[str]], types: dict[s
     return table, body[table.nbytes :]
 
 
-def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
-    """PLY as text, coordinates in full."""
+def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - PLY has no displacements
     axes = "".join(f"property double {axis}\n" for axis in "xyz")
     head = (
         f"ply\nformat ascii 1.0\ncomment unit mm\nelement vertex {len(surface.points)}\n{axes}"

@@ -11,10 +11,10 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
-from fem_reference.io.soup import DataSet, Lines, Soup, joined, only_triangles
+from fem_reference.io.soup import DataSet, Soup, check_lengths, joined, only_triangles
 
 _TRIANGLE = 5  # of VTK's cell types
-_NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
+_NO_ROOM = 20007  # VTK's number for a full disk; other errors of the system keep their numbers
 LINES = (".vtk", ".vtp")  # the formats that have polylines
 _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}
 
@@ -22,7 +22,7 @@ _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLU
 @dataclass(frozen=True, eq=False)
 class DataBlock:
     """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines; by name arrays ``of_points``
-    (n, ...), ``of_cells`` (m, ...), and ``numbers`` that are one for all of it.
+    (n, ...), ``of_cells`` (m, ...), and ``numbers`` of the whole block.
     """
 
     points: Floats
@@ -36,7 +36,7 @@ type Tree = Mapping[str, "DataBlock | Tree"]
 
 
 def _read(path: Path) -> Soup:
-    """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata passed over)."""
+    """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata are skipped)."""
     data = data_set(path)
     if data.kind == "UnstructuredGrid" and (other := set(data.types.tolist()) - {_TRIANGLE}):
         raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
@@ -49,8 +49,10 @@ def _read(path: Path) -> Soup:
     return data.points, cells.corners.reshape(-1, 3)
 
 
-def read_lines(path: Path) -> Lines:
-    """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
+def read_lines(path: Path, *, moved: bool) -> tuple[Floats, list[list[int]]]:
+    """Points (n, 3) of the file and the points of each line; ValueError for a line of one point, and if not ``moved`` for a point
+    that is not finite or a line without length.
+    """
     data = data_set(path)
     found = data.cells.get("Lines")
     if data.kind != "PolyData" or found is None or len(found.corners) == 0:
@@ -59,7 +61,10 @@ def read_lines(path: Path) -> Lines:
     for number, cell in enumerate(cells):
         if len(cell) < 2:
             raise ValueError(f"line {number} of {len(cell)} points")
-    return np.asarray(data.points, np.float64), joined(cells)
+    points, lines = np.asarray(data.points, np.float64), joined(cells)
+    if not moved:
+        check_lengths(points, lines)
+    return points, lines
 
 
 def data_set(path: Path) -> DataSet:
@@ -69,16 +74,14 @@ def data_set(path: Path) -> DataSet:
 
 
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm], float64; OSError where that
-    fails.
-    """
+    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm]; OSError where that fails."""
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
 
 
 def _finish(kind: str, path: Path, data: Any) -> None:
-    """Write by a writer of pyvista of this ``kind``; OSError where that fails. VTK complains to nobody meanwhile."""
+    """Write by a writer of pyvista of this ``kind``, without messages of VTK; OSError where that fails."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
@@ -94,7 +97,7 @@ def _finish(kind: str, path: Path, data: Any) -> None:
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """VTM of ``blocks`` by name, with their files in a folder beside it, so not whole or not at all; OSError where that fails."""
+    """VTM of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError where that fails."""
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 
@@ -106,7 +109,7 @@ def _collection(blocks: Tree) -> Any:
 
 
 def _data_set(block: DataBlock) -> Any:
-    """The points and cells of a block as VTK has them, with its arrays."""
+    """The points, cells and arrays of a block as a data set of pyvista."""
     import pyvista
 
     points = np.array(block.points, np.float64)

@@ -116,10 +116,12 @@ class Pass:
         if last is not None:
             before[last.points] = last.facets
         beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
-        reach = np.minimum(radii, self.deepest)[facets]
-        felt = np.flatnonzero((gap < most) & (gap > -reach) & (beyond <= _BEYOND))
+        felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & (beyond <= _BEYOND))
         here = self._here(self.side.nodes(unknowns), some[felt])
-        faces = np.einsum("ni,ni->n", here.normal, there.normal[felt]) < 0
+        facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
+        # A point just beyond the edge of a wall that it sees from inside is outside: another facet is in front of it, out of reach.
+        edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING)
+        faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
         order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
         order = order[faces[order]]
@@ -132,7 +134,7 @@ class Pass:
         unknowns, then = settled
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         height, bulge = self._heights(nodes, points, some, facets)
-        sizes = np.minimum(self.other.balls(nodes)[1], self.deepest)
+        sizes = self._reach(nodes)
         least = np.minimum(self.law.smoothing, _DEEP * np.minimum(sizes[some // self.each], sizes[facets]))
         before = np.full(len(points), -1)
         if then is not None:
@@ -159,9 +161,8 @@ class Pass:
         """Pairs of points and facets, among those given, that may be at gaps up to ``most`` [mm] and less deep than the radius, by
         the plane through the middle of the facet and the heights of its nodes above that.
         """
-        _, radii = self.other.balls(nodes)
         height, bulge = self._heights(nodes, points, some, facets)
-        kept = (height < most + bulge[facets]) & (height > -(np.minimum(radii, self.deepest) + bulge)[facets])
+        kept = (height < most + bulge[facets]) & (height > -(self._reach(nodes) + bulge)[facets])
         return some[kept], facets[kept]
 
     def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
@@ -214,7 +215,8 @@ class Pass:
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
-        they are behind the facet that they were near, or passed one on their path, and are not in contact.
+        they are behind the facet that they were near, or passed one on their path, and are not in contact. Points inside begin
+        behind their facet: their paths are raised to the smoothing, at most by what the facet reaches, as less deep ones are met.
         """
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
@@ -225,8 +227,15 @@ class Pass:
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
-        free[near.points[near.gap <= 0]] = False
+        inner = last.some(np.flatnonzero(last.gap <= 0))
+        raised = np.minimum(self.law.smoothing - inner.gap, self._reach(old)[inner.facets])
+        for places in (starts, ends):
+            places[inner.points] += raised[:, None] * inner.there.normal
         return np.union1d(behind, self._passed(starts, ends, old, new, free))
+
+    def _reach(self, nodes: Floats) -> Floats:
+        """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are felt: their radius, half the thickness of the part."""
+        return np.minimum(self.other.balls(nodes)[1], self.deepest)
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
         """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) and feel nothing:

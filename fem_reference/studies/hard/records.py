@@ -246,8 +246,8 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
 
 def _check_solvers(hard: Hard, task: Task) -> None:
     """InputError where a solver is named that hard cases are not solved by, or a setting that it has not."""
-    known = choices()
     named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
+    known = choices() if named or hard.settings else {}
     for key, name in [*named, *((f"settings.{name}", name) for name in hard.settings)]:
         if name not in known:
             raise InputError(join(hard.place, key), f'"{name}"', f"one of {', '.join(known)}")

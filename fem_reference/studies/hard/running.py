@@ -103,15 +103,15 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
     hard, solver = posed.hard, choice.solver
     try:
         if hard.only and solver not in hard.only:
-            return Cell(
-                hard.name, solver, "not applicable", f"the case is about {', '.join(hard.only)} only: {hard.because}"
-            )
+            return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
-            return Cell(hard.name, solver, "not applicable", "nothing but effects acts, and this solver simulates none")
+            return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
         if takes is not None and posed.problem.muscle is not None:
             acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
-                return Cell(hard.name, solver, "not applicable", f"it leaves out what acts here: {', '.join(lacks)}")
+                return Cell(
+                    hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
+                )
         with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:

@@ -115,6 +115,20 @@ def test_nothing_passes_a_thin_sheet_within_a_step(fem_lab, face) -> None:
     assert "went through the other side" in outcome.message
 
 
+@pytest.mark.parametrize("across", [0.0, 0.3])
+def test_a_pressed_block_does_not_pass_a_thin_sheet_within_a_step(across, fem_lab) -> None:
+    # All points of the block start 0.005 mm deep, on facets of 0.25 mm. Moved across by more, none is behind the facet that it was
+    # on; and facets reach 0.01 mm deep, half the thickness of the sheet, whose lower face is clamped.
+    sheet, ball = block((4, 4, 1), (1.0, 1.0, 0.02)), placed(block((2, 2, 1), (0.4, 0.4, 0.2)), 0.1, 0.3, 0.015)
+    body = pair(sheet, ball, across, 0.0, -0.5, law=replace(LAW, stiffness=1e-3))
+    bottom = Prescribed("bottom", "high_z0", (0, 1, 2), moved(across, 0.0, -0.5))
+    body = replace(body, prescribed=(*body.prescribed, bottom))
+    outcome = solved(fem_lab, body, first_step=1.0, smallest_step=0.8).outcome
+    assert outcome.status != "converged"
+    assert "(high_z0 on low_z1)" in outcome.message
+    assert "went through the other side" in outcome.message
+
+
 @pytest.mark.parametrize(("end", "status"), [(0.5, "diverged"), (1.0, "converged")])
 def test_a_pressed_point_that_slides_past_the_rim_of_a_part_is_no_silent_loss(end, status, fem_lab) -> None:
     # The upper block, 0.4 mm wide, slides from x = 0.05 .. 0.45 to 0.25 .. 0.65 on a face of which the part ends at 0.5 or is all.

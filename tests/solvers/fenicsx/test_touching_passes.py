@@ -1,5 +1,6 @@
 """Forces of contact between parts of a surface are the slope of its energy, and their tangent is theirs, on curved facets too."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 from mpi4py import MPI
 
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body
+from fem_reference.problems.body import Body, Cells
 from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx import meshes
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -34,15 +35,19 @@ def crumpled(element: str, friction: float | None = None) -> tuple[TouchingForce
     )
     high.points[:] += [-0.05, -0.1, 0.49]
     mesh = shapes.joined({"low": low, "high": high})
-    law = Touching("low_z1", "high_z0", K, D, friction)
+    found, displacement = contact_of(mesh, Touching("low_z1", "high_z0", K, D, friction), element)
+    dofs = displacement.dofs
+    found.unknowns.x.array[dofs] = 0.02 * np.random.default_rng(1).normal(size=dofs.shape)
+    return found, displacement
+
+
+def contact_of(mesh: Cells, law: Touching, element: str) -> tuple[TouchingForces, meshes.Displacement]:
+    """The contact of a ``law`` on a ``mesh`` at rest."""
     local = meshes.distribute(MPI.COMM_SELF, mesh)
     regions = dict(zip(mesh.facets, meshes.local_facets(local, mesh.facets.values()), strict=True))
     displacement = meshes.Displacement(meshes.unknowns(local, element))
     body = Body(mesh, (), (), (0.0, 1.0), touching=(law,))
-    found = TouchingForces(body, SimpleNamespace(regions=regions), displacement, Spent())
-    dofs = displacement.dofs
-    found.unknowns.x.array[dofs] = 0.02 * np.random.default_rng(1).normal(size=dofs.shape)
-    return found, displacement
+    return TouchingForces(body, SimpleNamespace(regions=regions), displacement, Spent()), displacement
 
 
 def energy(contact: TouchingForces) -> float:
@@ -164,3 +169,17 @@ def test_a_failed_attempt_changes_no_facet_that_a_point_stays_on() -> None:
     contact.go_back()
     unknowns[:] = start + small
     assert np.array_equal(residual(contact), once)
+
+
+def test_a_point_outside_beside_the_edge_of_a_wall_is_not_deep_in_the_wall() -> None:
+    """Two boxes that no motion has brought together: normals of top and walls are at right angles, to rounding of either sign."""
+    low, high = (shapes.box(counts, (20.0, 20.0, 10.0), "tetrahedron", 1) for counts in ((4, 4, 2), (3, 3, 1)))
+    high.points[:] += [-2.0, -2.0, 10.16]  # further away than the smoothing, and nearer than 0.02 of an edge
+    mesh = shapes.joined({"low": low, "high": high})
+    facets = {
+        name: np.concatenate([mesh.facets[f"{name}_{side}"] for side in ("x0", "x1", "y0", "y1", face)])
+        for name, face in (("low", "z1"), ("high", "z0"))
+    }
+    mesh = replace(mesh, facets=facets)
+    contact, _ = contact_of(mesh, Touching("low", "high", K, D), "P2/P1")
+    assert [len(met.points) for met, _ in contact.now] == [0, 0]

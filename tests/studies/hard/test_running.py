@@ -37,7 +37,7 @@ def test_a_solver_that_leaves_out_what_acts_is_no_success() -> None:
         ("round_edge.tendon", ("contact",), "fibre_passive"),
     ):
         found = running.cell(running.Posed(CASES[name]), choice, takes)
-        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out what acts here: {lacks}")
+        assert (found.verdict, found.sentence) == ("not applicable", f"it leaves out effects of this case: {lacks}")
     assert running.cell(running.Posed(CASES["at_rest.millimetres"]), choice, ()).verdict == "ok"
 
 
@@ -145,4 +145,4 @@ def test_a_reference_that_stalls_is_inconclusive(monkeypatch) -> None:
 def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
     hard = CASES["at_rest.millimetres"].model_copy(update={"only": ("pbd",), "because": "it is about PBD"})
     found = running.cell(running.Posed(hard), records.choices()["arap"])
-    assert (found.verdict, found.sentence) == ("not applicable", "the case is about pbd only: it is about PBD")
+    assert (found.verdict, found.sentence) == ("not applicable", "only for pbd: it is about PBD")

@@ -1,0 +1,107 @@
+"""Regions in FEBio's input file: tetrahedra with nearly the same parameters are a part with one material.
+
+FEBio takes the bulk modulus of an uncoupled material as one number, so that no map of element data can carry a region.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from fem_reference.effects import Effect, region_of
+from fem_reference.effects.fibre_passive import FibrePassive
+from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
+from fem_reference.effects.mooney_rivlin import MooneyRivlin
+from fem_reference.effects.neo_hooke import NeoHooke
+from fem_reference.foundations.material_point import REST
+from fem_reference.foundations.mesh import Floats, Ints, tet_volumes
+from fem_reference.problems.muscle import MuscleProblem
+
+MUSCLE = "muscle"  # the name of the elements and the material of a muscle without regions, and the beginning of those of its parts
+# The parameters that an energy is proportional to.
+SCALED: dict[type[Effect], tuple[str, ...]] = {
+    NeoHooke: ("mu",),
+    MooneyRivlin: ("c1", "c2"),
+    Incompressible: ("bulk",),
+    IncompressiblePenalty: ("bulk",),
+    FibrePassive: ("stress",),
+    FibrePassiveFebio: ("c3", "c5"),
+}
+# Parameters of a part are within this factor of each other; what is less than this share of the greatest counts as that.
+FACTOR, _LEAST = 1.2, 0.01
+# The points of a quadrature of degree 2 in a tetrahedron, by the shares of its corners.
+_NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
+_POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Tetrahedra ``cells`` (k,) of one material, by its ``name``, and the ``effects`` in it, times their mean share there."""
+
+    name: str
+    cells: Ints
+    effects: tuple[Effect, ...]
+
+
+def shares(problem: MuscleProblem) -> dict[str, Floats]:
+    """The mean share (m,) of each tetrahedron in each region that an effect names, and outside of it."""
+    corners, found = problem.mesh.points[problem.mesh.tets], dict[str, Floats]()
+    for name in dict.fromkeys(filter(None, map(region_of, problem.effects))):
+        points = np.einsum("qc,mci->mqi", _POINTS, corners).reshape(-1, 3)
+        within = problem.regions[name.removeprefix(REST)](points).reshape(len(corners), -1).mean(axis=1)
+        found[name] = 1 - within if name.startswith(REST) else within
+    return found
+
+
+@lru_cache(maxsize=8)
+def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
+    """The parts of a muscle, the largest first; one where no effect has a region."""
+    known = shares(problem)
+    if not known:
+        return (Piece(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
+    levels = np.stack([_levels(one) for one in _parameters(problem, known)], axis=1)
+    _, which, counts = np.unique(levels, axis=0, return_inverse=True, return_counts=True)
+    volumes, found = tet_volumes(problem.mesh.points, problem.mesh.tets), list[Piece]()
+    for number, kind in enumerate(np.argsort(-counts, kind="stable"), start=1):
+        cells = np.flatnonzero(which == kind)
+        means = {name: float(np.average(one[cells], weights=volumes[cells])) for name, one in known.items()}
+        acting = (_scaled(effect, means.get(region_of(effect), 1.0)) for effect in problem.effects)
+        found.append(Piece(f"{MUSCLE}_{number}", cells, tuple(one for one in acting if one is not None)))
+    return tuple(found)
+
+
+def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[Floats]:
+    """The parameters (m,) of each tetrahedron: sums over the effects of a kind, of fibres, whose laws differ, by effect."""
+    found = dict[tuple[object, str], Floats]()
+    for i, effect in enumerate(problem.effects):
+        for key in SCALED.get(type(effect), ()):
+            of = (i if isinstance(effect, FibrePassive) else type(effect), key)
+            amount = known.get(region_of(effect), np.ones(len(problem.mesh.tets))) * getattr(effect, key)
+            found[of] = found.get(of, 0.0) + amount
+    return list(found.values())
+
+
+def _levels(values: Floats) -> Ints:
+    """The number (m,) of the interval that each of positive ``values`` (m,) is in."""
+    least = max(_LEAST * float(values.max()), np.finfo(float).tiny)
+    return np.asarray(np.round(np.log(np.maximum(values, least)) / np.log(FACTOR)), np.int64)
+
+
+def _scaled(effect: Effect, share: float) -> Effect | None:
+    """The ``effect`` times its ``share``; None where it has none."""
+    keys = SCALED.get(type(effect), ())
+    if share <= 0 and keys:
+        return None
+    return effect.model_copy(update={key: share * getattr(effect, key) for key in keys})
+
+
+def note(problem: MuscleProblem) -> list[str]:
+    """A sentence on the parts, where there are regions."""
+    many = len(parts(problem))
+    text = (
+        f"regions are {many} materials, each in tetrahedra whose parameters are within a factor of {FACTOR:g}, with their mean: "
+        "constant in each tetrahedron, at every quadrature point in the reference"
+    )
+    return [text] if many > 1 else []

@@ -1,0 +1,17 @@
+"""The modules that stand in folders: what a package offers, one file or folder each."""
+
+import pkgutil
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+
+def names(places: Iterable[str]) -> tuple[str, ...]:
+    """The names of the modules in the folders ``places``, sorted; each folder is listed again once a file was added or removed."""
+    return _listed(tuple((place, Path(place).stat().st_mtime_ns) for place in places if Path(place).is_dir()))
+
+
+@cache
+def _listed(places: tuple[tuple[str, int], ...]) -> tuple[str, ...]:
+    """The names of the modules in folders, each with its time of change."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules([place for place, _ in places])))
