@@ -256,8 +256,8 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            allowed = give(problem, bone, float(pressures[i]), apart)
-            check_of = partial(_deep, bone, number, allowed, pressed=bool(pressures[i] > 0))
+            pressure = float(pressures[i])
+            check_of = partial(_deep, bone, number, give(problem, bone, pressure, apart), pressed=pressure > 0)
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
@@ -281,9 +281,7 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] of a bone: the compliance of contact under the recorded ``pressure`` [MPa], the error of the
-    bone's distance, and the part between contact points, which are half of ``apart`` [mm] apart.
-    """
+    """The allowed penetration [mm]: by the ``pressure`` [MPa], the error of the distance, and points half of ``apart`` [mm] apart."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * apart
