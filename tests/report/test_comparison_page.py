@@ -49,7 +49,7 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
 
 
 def test_how_well_the_reference_is_known_is_reported(comparison):
-    assert "With <code>--error-bar</code> the reference is solved" in html(comparison)
+    assert "With <code>--error-bar</code> the reference is also solved" in html(comparison)
     text = html(with_bars(comparison))
     # The bands of the model stand beside the numerical bars of what is in the headline, and without bars too.
     for whole in (text, html(comparison)):
