@@ -87,7 +87,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     status, facts = call(case, "run")
     assert (status, facts["error_bars"], facts["verdicts"][0]["error_bar"]) == (cli.VERDICT_FAIL, [], None)  # it swells
     page = case.parent / "out" / "bar-reference" / "report.html"
-    assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
+    assert "With <code>--error-bar</code> the reference is also solved" in page.read_text()
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
