@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
@@ -28,6 +29,18 @@ log = logging.getLogger(__name__)
 # A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
 CaseSetup = Setup | MusclesSetup | FieldProblem
 CaseProblem = MuscleProblem | MusclesProblem | FieldProblem
+Moved = MuscleProblem | MusclesProblem
+
+
+def moved(problem: CaseProblem) -> Moved | None:
+    """One muscle or several; None of a field."""
+    return None if isinstance(problem, FieldProblem) else problem
+
+
+def acting(problem: Moved) -> tuple[Effect, ...]:
+    """The effects of one muscle, or of all."""
+    each = [problem] if isinstance(problem, MuscleProblem) else problem.problems.values()
+    return tuple(effect for one in each for effect in one.effects)
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:

@@ -15,9 +15,8 @@ from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
-from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.of_case import CaseProblem, Moved, acting, moved
 from fem_reference.problems.problem import NO_SURFACE
-from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -33,7 +32,6 @@ MOVED = 0.1  # of a cell of a block, by which its points are moved at most
 SIZES = 0.03  # of the size of the tetrahedra of a shipped case, by which it differs at most
 LONGEST = 60.0  # [s] of processor time of a run that is repeated
 
-Moved = MuscleProblem | MusclesProblem
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
@@ -49,7 +47,7 @@ def check_not_stalled(outcome: Outcome) -> None:
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     """Solve a problem by a solver; InputError where it does not suit the solver, StalledError where the machine was too busy."""
-    solver, task, muscle = choice.solver, task_of(choice.solver, built.task), _moved(built)
+    solver, task, muscle = choice.solver, task_of(choice.solver, built.task), moved(built)
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
     if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
@@ -59,7 +57,7 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, for correctness and not for speed"
         raise InputError(solver, f"{len(built.muscle.mesh.tets)} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
-    solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
+    solvers.check(solver, settings, acting(muscle) if muscle else (), solver, task)
     solvers.find(solver, solver, task).require(settings)
     frames = list[Frame]()
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)
@@ -79,11 +77,6 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(rest))])
 
 
-def _moved(built: CaseProblem) -> Moved | None:
-    """One muscle or several; None of a field."""
-    return None if isinstance(built, FieldProblem) else built
-
-
 def _of_muscle(built: Moved, frames: list[Frame]) -> Followed:
     tets = [frame.points for frame in frames if len(frame.points)]
     whole = len(tets) == len(frames)
@@ -101,7 +94,7 @@ def _of_muscle(built: Moved, frames: list[Frame]) -> Followed:
         np.array([frame.surface for frame in frames if frame.surface is not None]),
         built.rest.mesh if whole else None,
         np.array(tets) if whole else None,
-        built.bones,
+        built.bones if isinstance(built, MuscleProblem) else next(iter(built.problems.values())).bones,
         built.free,
         integrated=scalar("volume_ratio"),
         negative_modes=scalar("negative_modes"),

@@ -73,7 +73,7 @@ class Hold(Record):
     stiffness: AreaStiffness | None = None
 
 
-class Beside(Record):
+class Further(Record):
     """Another body, by its ``name``: a ``block`` with its ``hold``, and the ``effect`` that act in place of those in the first."""
 
     name: Name
@@ -126,7 +126,7 @@ class Hard(Record):
     bound: tuple[Bound, ...] = Field(min_length=1)
     block: Lattice | None = None
     hold: tuple[Hold, ...] = ()
-    beside: tuple[Beside, ...] = ()
+    beside: tuple[Further, ...] = ()
     bone: tuple[CaseBone, ...] = ()
     effect: tuple[Effect, ...] = ()
     frames: Frames | None = None

@@ -22,7 +22,6 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseProblem
-from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import Candidate, SolverChoice
@@ -107,8 +106,8 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
             return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
-        if takes is not None and not isinstance(posed.problem, FieldProblem):
-            acting = dict.fromkeys(name_of(one) for one in posed.problem.effects)
+        if takes is not None and (muscle := of_case.moved(posed.problem)) is not None:
+            acting = dict.fromkeys(name_of(one) for one in of_case.acting(muscle))
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
                 return Cell(
                     hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
@@ -187,8 +186,8 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
     """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
-    hard, built = posed.hard, posed.problem
-    if isinstance(built, FieldProblem) or choice.solver != REFERENCE:
+    hard, built = posed.hard, of_case.moved(posed.problem)
+    if built is None or choice.solver != REFERENCE:
         return
     asked = posed.in_steps and hard.start is None and not built.body.rubs  # with friction the end depends on the path
     wanted = hard.steps or (following.farthest(followed) if asked else None)
