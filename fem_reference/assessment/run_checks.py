@@ -63,9 +63,7 @@ class RunCheck:
     @property
     def share(self) -> float:
         """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
-        if self.allowed == 0:
-            return 0.0 if self.met else math.inf
-        return math.inf if math.isnan(share := self.value / self.allowed) else share
+        return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:
         value, allowed = ("not a number" if one is None else f"{one:.3g}" for one in (self.value, self.allowed))
