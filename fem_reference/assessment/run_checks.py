@@ -62,7 +62,9 @@ class RunCheck:
 
     @property
     def share(self) -> float:
-        """The value over the allowed one; infinite where either is not a number."""
+        """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
+        if self.allowed == 0:
+            return 0.0 if self.met else math.inf
         return math.inf if math.isnan(share := self.value / self.allowed) else share
 
     def __str__(self) -> str:
@@ -254,11 +256,8 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            assert problem.contact is not None  # as there are obstacles
-            known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
-            # The compliance of contact, the error of the distance, and the part between contact points.
-            give = float(pressures[i]) / problem.contact.stiffness + known + _BETWEEN * apart
-            check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
+            allowed = give(problem, bone, float(pressures[i]), apart)
+            check_of = partial(_deep, bone, number, allowed, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
@@ -279,6 +278,15 @@ def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, 
 @lru_cache(maxsize=8)
 def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
+
+
+def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
+    """The allowed penetration [mm] of a bone: the compliance of contact under the recorded ``pressure`` [MPa], the error of the
+    bone's distance, and the part between contact points, which are half of ``apart`` [mm] apart.
+    """
+    assert problem.contact is not None  # called only with contact
+    known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
+    return pressure / problem.contact.stiffness + known + _BETWEEN * apart
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:

@@ -44,9 +44,8 @@ class Projections(Record):
 class ArapPbdSettings(Record):
     """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
-    ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they give the
-    states of kirchhoff. ``volume_constraint``: minimise the energy at the volume of rest. ``projections``: off
-    where the key is omitted.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; Tutte's are not offered, as with removed rows they give the
+    states of kirchhoff. ``volume_constraint``: minimise the energy at the volume of rest. ``projections``: none by default.
     """
 
     weights: Symmetric

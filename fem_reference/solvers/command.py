@@ -45,10 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command, and the value of each setting in it.
 
-    ``unit``: the unit of length of its frames, by default that of a ``candidate.toml`` beside them, else mm. ``version``: of the
-    program. ``files``: files and folders that determine its results beside those that the command names. ``moves``: the carrier
-    of its unknowns. ``time_limit``: processor time after which it is ended. ``directory``: where it runs. ``ladder``: useful
-    values of settings, from the fastest to the most accurate.
+    ``unit``: the unit of length of its frames, by default that of a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    that of the program. ``files``: further files and folders that determine its results, besides those in the command. ``moves``:
+    the mesh with its unknowns. ``time_limit``: the limit of processor time. ``directory``: its working directory. ``ladder``:
+    useful values of settings, from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())

@@ -30,9 +30,9 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``via_count``: this many points instead, evenly
-    spread over each fibre, each on the bone of the nearer end. ``obstacle``: what every part of a line goes around, from one
-    fixed point to the next, where the straight path would cross it. ``hill``: their forces.
+    ``via``: points in the order in which a fibre passes them. ``via_count``: instead, a number of points evenly spread over each
+    fibre, each on the bone of the nearer end. ``obstacle``: surfaces that each segment between two fixed points goes around,
+    where the straight path would cross them. ``hill``: forces of the lines.
     """
 
     via: tuple[Via, ...] = ()

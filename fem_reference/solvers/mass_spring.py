@@ -49,13 +49,12 @@ def _damping(text: object) -> float | str:
 class MassSpringSettings(Record):
     """Stiffness, mass and time of the muscle.
 
-    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal: equilibrium does not depend on them, and a
-    small one would make every time step small.
-    ``frame_time``: the solver's own time from a frame number to the next; the longer it is, the nearer the muscle comes to
-    equilibrium. The scene's interval applies to the reference and to recorded sequences. ``damping``: the
-    coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
-    ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
-    ``time_step``: the longest step wanted; without it one that is stable.
+    ``stiffness``: that of every spring. ``density``: that of the muscle. All masses are equal: equilibrium does not depend on
+    them, and a small one would make every time step small. ``frame_time``: the solver's own time from a frame number to the next;
+    the longer it is, the nearer the muscle comes to equilibrium. The scene's interval applies to the reference and to recorded
+    sequences. ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an
+    acceleration, by default none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest
+    allowed step, by default a stable one.
     """
 
     stiffness: Stiffness

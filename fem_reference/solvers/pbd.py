@@ -40,13 +40,13 @@ class PbdCollision(Record):
 class PbdSettings(Record):
     """The settings of the algorithm; every key is required but those that turn an effect on.
 
-    ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over
-    all constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8), 0 for
-    none. ``stretch``, ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles, the
-    share of its error that one projection of a constraint takes away, from 0 (constraint off) to 1.
+    ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over all
+    constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8). ``stretch``,
+    ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles: the share of its error that one
+    projection of a constraint removes, from 0 (constraint off) to 1.
 
-    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)`` of their angle to the nearest fibre, both at rest;
-    1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
+    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; 1 in the
+    report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]

@@ -46,8 +46,8 @@ ABOUT = "candidate.toml"
 class RecordedSettings(Record):
     """The place of the sequence, and its unit of length.
 
-    ``folder``: a folder with one mesh file a frame, numbered by the last digits of their names; a .pvd or .xdmf file or
-    a folder with one; or the folder of a stored run.
+    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of the name; a .pvd or .xdmf file or a
+    folder with one; or the folder of a stored run.
     """
 
     folder: str

@@ -35,9 +35,9 @@ _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """``points``: of each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``, ``bending``,
-    ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods keep their
-    radius away from bones, or what they have at rest, and the surface leaves bones; off where the key is omitted.
+    """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
+    ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
+    keep a distance of their radius from bones, or that at rest, and the surface is moved out of bones; by default off.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]

@@ -43,13 +43,13 @@ class XpbdCollision(Record):
 class XpbdSettings(Record):
     """The settings of the method and of the muscle; every key is required but those that turn an effect on.
 
-    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of
-    the reference and of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
-    step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
+    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of the reference and
+    of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time step. ``density``
+    [t/mm3]: that of the enclosed body; its mass is divided among the vertices in proportion to area.
 
-    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
-    [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay without forces.
-    ``collision``: contact with bones.
+    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: the stiffness of a plate. ``volume``
+    [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate at which velocities decay without forces. ``collision``:
+    contact with bones.
     """
 
     frame_time: units.Time

@@ -118,10 +118,10 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as Hill-type muscles with tendons, in equilibrium at each frame (5.1): all alike, and together of a ``max_force``.
+    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: that of all together.
 
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just slack;
-    ``pennation``: their angle; ``activation``: from 0 to 1.
+    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just
+    slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
     """
 
     max_force: Force

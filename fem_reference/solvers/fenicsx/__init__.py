@@ -102,7 +102,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     with opened(chosen.ranks or 1) as solver:
         outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
-        begin = "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given)"
+        begin = "while an overlap at rest was removed, before the first frame (which is shown as it was given)"
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)

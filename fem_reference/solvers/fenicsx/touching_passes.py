@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints
@@ -215,23 +216,28 @@ class Pass:
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
-        they are behind the facet that they were near, or passed one on their path, and are not in contact. Points inside begin
-        behind their facet: their paths are raised to the smoothing, at most by what the facet reaches, as less deep ones are met.
+        they are behind the facet that they were near, or passed one on their path, and are not in contact. Paths that begin inside,
+        or so near that flat pieces of a facet may be in front, are followed from in front too: raised by at most what the facet
+        reaches, as less deep points are met. What ends in front of a facet has passed flat pieces of it alone.
         """
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
-        free[met.points] = False
+        free[met.points], none = False, np.zeros(0, np.int64)
         old, new = self.other.nodes(before), self.other.nodes(now)
         near = self.met(before, float(self.other.balls(old)[1].max()), None, (before, last))
         near = near.some(np.flatnonzero(free[near.points]))
         there = self.other.nearest(new, near.facets, ends[near.points])
         gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
         behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
-        inner = last.some(np.flatnonzero(last.gap <= 0))
-        raised = np.minimum(self.law.smoothing - inner.gap, self._reach(old)[inner.facets])
-        for places in (starts, ends):
-            places[inner.points] += raised[:, None] * inner.there.normal
-        return np.union1d(behind, self._passed(starts, ends, old, new, free))
+        rise, reach, clear = np.zeros_like(starts), self._reach(old), self._heights(old, starts, none, none)[1]
+        for one in (near, last):
+            high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
+            rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
+        paths = (starts, ends, free), (starts + rise, ends + rise, free & rise.any(axis=1))
+        points, facets = np.concatenate([self._passed(a, b, some, old, new) for a, b, some in paths], axis=1)
+        there = self.other.nearest(new, facets, ends[points])
+        front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= 0)
+        return np.union1d(behind, points[~front])
 
     def _reach(self, nodes: Floats) -> Floats:
         """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are felt: their radius, half the thickness of the part."""
@@ -248,8 +254,8 @@ class Pass:
         lost = (np.isin(near.points, pressed) & facing) | deep
         return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
-    def _passed(self, starts: Floats, ends: Floats, old: Floats, new: Floats, free: Floats) -> Ints:
-        """The ``free`` points (n,) that pass a facet on their path."""
+    def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], old: Floats, new: Floats) -> Ints:
+        """The ``free`` points (n,) that pass flat pieces of facets on their path, and these facets: (2, p)."""
         shift = (new - old).mean(axis=(0, 1))  # what all do together changes nothing
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
@@ -257,13 +263,14 @@ class Pass:
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2
         some, facets = self._near((starts + ends) / 2, ((first + last) / 2, radii), radii, far, old, new)
         some, facets = some[free[some]], facets[free[some]]
-        lost = [np.zeros(0, np.int64)]
+        lost = [np.zeros((2, 0), np.int64)]
         for part in np.array_split(np.arange(len(some)), len(some) // _AT_ONCE + 1):
             pieces = self.pieces[facets[part]]
             which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
             corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
-            lost.append(points[passed(starts[points], ends[points], *corners)])
-        return np.unique(np.concatenate(lost))
+            found = passed(starts[points], ends[points], *corners).reshape(pieces.shape[:2]).any(axis=1)
+            lost.append(np.stack([some, facets])[:, part[found]])
+        return np.concatenate(lost, axis=1)
 
 
 def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:

@@ -1,12 +1,14 @@
 """Blocks as problems: an axis-aligned lattice of tetrahedra, whose boundary is the surface given to solvers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from fem_reference import effects
 from fem_reference.effects.contact import among
+from fem_reference.effects.touching import MuscleContact
+from fem_reference.effects.touching import among as touching_among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
 from fem_reference.foundations.motion import apply
@@ -17,9 +19,10 @@ from fem_reference.geometry.skins import spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import MuscleProblem, assembled, closed_form
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
+from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, Lattice, Start
 
 # The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
@@ -55,6 +58,29 @@ def problem(hard: Hard) -> MuscleProblem:
     if not tet_volumes(points, tets).min() > 0:
         raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
     return _filled(block, setup, TetMesh(points, tets, facets, maker="lattice"), acting)
+
+
+def several(hard: Hard) -> MusclesProblem:
+    """The problem of the block of ``hard`` and the bodies beside it, any two of which may touch where that acts."""
+    law, apart = touching_among(hard.effect), dict[str, MuscleProblem]()
+    parts = {FIRST: hard}
+    for one in hard.beside:
+        own = {"block": one.block, "hold": one.hold, "effect": one.effect or hard.effect}
+        parts[one.name] = hard.model_copy(update=own)
+    for name, part in parts.items():
+        acting = tuple(effect for effect in part.effect if not isinstance(effect, MuscleContact))
+        apart[name] = _named(name, problem(part.model_copy(update={"effect": acting})))
+    # All have all bones, as the muscles of a scene.
+    held = tuple(entry.bone for one in apart.values() for entry in one.attached)
+    bones = (*held, *next(iter(apart.values())).bones[len(hard.hold) :])
+    pairs = tuple(combinations(apart, 2)) if law else ()
+    return MusclesProblem({name: replace(one, bones=bones) for name, one in apart.items()}, pairs, law, apart=True)
+
+
+def _named(name: str, one: MuscleProblem) -> MuscleProblem:
+    """A block whose holds have bones with its ``name``."""
+    held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
+    return replace(one, attached=tuple(held))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +123,16 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
         random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
         random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat; edges and corners stay in place
         shares += random
-    return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))
+    around = shares if block.rounding == 0 else (1 + _rounded(2 * shares - 1, block.rounding)) / 2
+    return np.asarray(np.asarray(block.corner) + around * np.asarray(block.size))
+
+
+def _rounded(unit: Floats, share: float) -> Floats:
+    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the ball inside by a ``share`` of their way: with y and z the
+    other two, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, so that the surface of the cube is that of the ball.
+    """
+    y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))
+    return np.asarray(unit * (1 - share + share * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)))
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:

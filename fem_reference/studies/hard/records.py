@@ -12,7 +12,7 @@ from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import FileName, Record, join, keys, one_of, parse
+from fem_reference.foundations.records import FileName, Name, Record, join, keys, one_of, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
@@ -24,6 +24,7 @@ FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
 _MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
+FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # [s] of processor time of a run
 _OWN: dict[str, dict[str, Any]] = {
@@ -37,8 +38,9 @@ class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
-    block and its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres and of the measured lines. ``points_apart``
-    [mm]: the spacing of points on which bones press and springs pull, by default as on muscles.
+    block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
+    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points on which bones press and springs pull, by default
+    as on muscles.
     """
 
     size: Point
@@ -47,6 +49,7 @@ class Lattice(Record):
     grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
     jitter: float = Field(default=0.0, ge=0, lt=0.5)
     seed: int = Field(default=17, ge=0)
+    rounding: float = Field(default=0.0, ge=0, lt=1)
     fibre: tuple[float, float, float] = (0.0, 0.0, 1.0)
     points_apart: PositiveLength | None = None
 
@@ -68,6 +71,15 @@ class Hold(Record):
     middle: bool = False
     motion: Motion | None = None
     stiffness: AreaStiffness | None = None
+
+
+class OtherBody(Record):
+    """Another body, by its ``name``: a ``block`` with its ``hold``, and the ``effect`` that act in place of those in the first."""
+
+    name: Name
+    block: Lattice
+    hold: tuple[Hold, ...] = ()
+    effect: tuple[Effect, ...] = ()
 
 
 class Start(Record):
@@ -100,7 +112,7 @@ class StepCounts(Record):
 
 
 class Hard(Record):
-    """A hard case: a ``block`` with what acts on it, or a ``shipped`` case.
+    """A hard case: a ``block`` with what acts on it and bodies ``beside`` it, or a ``shipped`` case.
 
     ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
     case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
@@ -114,6 +126,7 @@ class Hard(Record):
     bound: tuple[Bound, ...] = Field(min_length=1)
     block: Lattice | None = None
     hold: tuple[Hold, ...] = ()
+    beside: tuple[OtherBody, ...] = ()
     bone: tuple[CaseBone, ...] = ()
     effect: tuple[Effect, ...] = ()
     frames: Frames | None = None
@@ -159,6 +172,10 @@ class Hard(Record):
     def _check(self) -> Self:
         if (self.block is None) != (self.frames is None):
             raise ValueError('"frames" beside "block" and only there')
+        if self.beside and (self.block is None or self.start is not None or FIRST in (one.name for one in self.beside)):
+            raise ValueError(
+                f'"beside" with a "block", without a "start", and no body named "{FIRST}", as the first is'
+            )
         if bool(self.only) != bool(self.because):
             raise ValueError('"because" beside "only" and only there')
         return self
@@ -223,6 +240,8 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
             raise InputError(join(where, key), "an unknown key", f"one of {', '.join(keys(Hard))}")
     if "effect" in table:
         table = table | {"effect": casefile.effects(table["effect"], where)}
+    if isinstance(several := table.get("beside"), list):
+        table = table | {"beside": [_with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
         want = 'nothing beside "no_solution", as no run should reach its end'
@@ -242,6 +261,13 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
         raise InputError(join(where, "steps.until"), hard.steps.until, want)
     return hard
+
+
+def _with_effects(one: Any, where: str) -> Any:
+    """A body beside, with the effects that its table names."""
+    return (
+        one | {"effect": casefile.effects(one["effect"], where)} if isinstance(one, dict) and "effect" in one else one
+    )
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:

@@ -21,7 +21,7 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
-from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.of_case import CaseProblem, mechanical
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import Candidate, SolverChoice
@@ -60,7 +60,7 @@ class Posed:
     def problem(self) -> CaseProblem:
         """The problem; InputError where the case is invalid."""
         if self.hard.block is not None:
-            return blocks.problem(self.hard)
+            return blocks.several(self.hard) if self.hard.beside else blocks.problem(self.hard)
         shipped = self.hard.shipped
         assert shipped is not None  # a Hard record has one of the two
         case = shipped.read()
@@ -107,8 +107,8 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
             return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
-        if takes is not None and posed.problem.muscle is not None:
-            acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
+        if takes is not None and (problem := mechanical(posed.problem)) is not None:
+            acting = dict.fromkeys(name_of(one) for one in problem.effects)
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
                 return Cell(
                     hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
@@ -162,7 +162,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     if posed.problem.field is not None:  # settings for bodies do not matter there
         choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
     outcome, followed = follow(posed.problem, choice)
-    if solver == REFERENCE and posed.problem.muscle is not None and outcome.status == "converged":
+    if solver == REFERENCE and posed.problem.field is None and outcome.status == "converged":
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
@@ -189,13 +189,13 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
     """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
-    hard, muscle = posed.hard, posed.problem.muscle
-    if muscle is None or choice.solver != REFERENCE:
+    hard, built = posed.hard, mechanical(posed.problem)
+    if built is None or choice.solver != REFERENCE:
         return
-    asked = posed.in_steps and hard.start is None and not muscle.body.rubs  # with friction the end depends on the path
+    asked = posed.in_steps and hard.start is None and not built.body.rubs  # with friction the end depends on the path
     wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
-        yield following.in_steps(muscle, choice, wanted)
+        yield following.in_steps(built, choice, wanted)
     if posed.jitters:
         first = outcome, followed
         yield following.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))

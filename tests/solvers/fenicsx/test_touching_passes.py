@@ -171,6 +171,50 @@ def test_a_failed_attempt_changes_no_facet_that_a_point_stays_on() -> None:
     assert np.array_equal(residual(contact), once)
 
 
+def lost(element: str, x: tuple[float, float], z: tuple[float, float], sag: float = 0.0) -> np.ndarray:
+    """True for each point of the lower face of a small block that went through in a load step, in which the middle of the face goes
+    along ``x`` and ``z``, over a block with its top at z = 0.5, of which both halves sag by ``sag``.
+    """
+    kind = KINDS[element][0]
+    low, high = shapes.box((2, 1, 1), (1.0, 1.0, 0.5), kind), shapes.box((1, 1, 1), (0.04, 0.04, 0.001), kind)
+    high.points[:] += [0.48, 0.3, 1.5]
+    mesh = shapes.joined({"low": low, "high": high})
+    contact, displacement = contact_of(mesh, Touching("low_z1", "high_z0", K, 0.02), element)
+    unknowns, one = contact.unknowns.x.array, contact.passes[1]
+    upper = displacement.dofs[displacement.space.tabulate_dof_coordinates()[:, 2] > 1.4]
+    share = 2 * one.other.rest[..., 0] % 1
+    unknowns[one.other.dofs[..., 2]] = -4 * sag * share * (1 - share)
+    unknowns[upper] = [x[0] - 0.5, 0.0, z[0] - 1.5]
+    contact.settle()
+    before, last, unknowns[upper] = np.array(unknowns), contact.now[1][0], [x[1] - 0.5, 0.0, z[1] - 1.5]
+    contact.look()
+    return np.isin(np.arange(len(one.areas)), one.through(before, last, contact.seen, contact.now[1][0]))
+
+
+@pytest.mark.parametrize("element", KINDS)
+@pytest.mark.parametrize("end", [0.25, 0.85])
+@pytest.mark.parametrize("start", [0.55, 0.51, 0.49, 0.4])
+def test_a_point_that_goes_through_is_found_also_where_it_moves_along(element, end, start) -> None:
+    # From in front, near, and inside; deeper than facets reach: at most half the thickness of 0.5. Ends beside the facet, or below.
+    assert lost(element, (0.25, end), (start, -0.7)).all()
+
+
+@pytest.mark.parametrize("element", ["P2/P1", "Q2/Q1"])
+@pytest.mark.parametrize("end", [0.25, 0.85])
+def test_a_point_between_a_curved_facet_and_its_flat_pieces_is_not_lost(element, end) -> None:
+    # At x = 0.125 the facet is at 0.5 - 3/4 0.2 = 0.35, and flat pieces between its nodes at 0.4.
+    assert lost(element, (0.125, end), (0.39, -0.7), 0.2).all()
+    assert lost(element, (0.125, end), (0.43, -0.7), 0.2).all()
+    # From in front of the pieces to behind, and still in front of the facet.
+    assert not lost(element, (0.125, 0.125), (0.43, 0.39), 0.2).any()
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_points_that_leave_or_slide_off_are_not_lost(element) -> None:
+    assert not lost(element, (0.25, 0.8), (0.45, 0.55)).any()
+    assert not lost(element, (0.9, 1.1), (0.49, 0.48)).any()
+
+
 def test_a_point_outside_beside_the_edge_of_a_wall_is_not_deep_in_the_wall() -> None:
     """Two boxes that no motion has brought together: normals of top and walls are at right angles, to rounding of either sign."""
     low, high = (shapes.box(counts, (20.0, 20.0, 10.0), "tetrahedron", 1) for counts in ((4, 4, 2), (3, 3, 1)))

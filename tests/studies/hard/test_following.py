@@ -111,3 +111,23 @@ def test_jitters_of_a_shipped_case_have_tetrahedra_of_another_size() -> None:
     given = hard.shipped.read().muscle.tet_size
     assert sizes[0] != sizes[1]
     assert all(0 < abs(size / given - 1) < following.SIZES for size in sizes)
+
+
+def test_bodies_in_each_other_are_compared_each_with_itself() -> None:
+    """Where two bodies overlap, a point has its place in the mesh of its own."""
+    hard = CASES["neighbours.overlap"]
+
+    def lifted(one: records.Hard) -> tuple[Outcome, health.Followed]:
+        built = blocks.several(one)
+        rest, (_, upper), shift = built.rest, built.spans, np.array([0, 0, 5.0])
+        points, nodes = np.array(rest.surface.points), np.array(rest.mesh.points)
+        points[upper.vertices] += shift
+        nodes[upper.points] += shift
+        followed = health.Followed((0,), rest.surface, points[None], rest.mesh, nodes[None], spans=built.spans)
+        return Outcome("converged", ""), followed
+
+    meshes = [blocks.several(following.jittered(hard, number)).rest.mesh.points for number in (1, 2)]
+    assert not np.array_equal(*meshes)
+    same = following.on_meshes(hard, lifted(hard), 2, lifted)
+    assert same.same
+    assert float(same.sentence.split("apart by ")[1].split(" %")[0]) < 1e-6
