@@ -1,6 +1,4 @@
-"""Checks of all states that a solver calls converged, from its recorded positions and forces, independent of its loop. A check has
-its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
-"""
+"""Checks of the states that a solver calls converged, from recorded positions and forces, independent of the solver's loop."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
