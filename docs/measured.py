@@ -70,6 +70,7 @@ def _make(measurement: Measurement, path: Path) -> None:
     for case in measurement.cases or ("",):
         words = shlex.split(measurement.command.replace("CASE", case))[1:]
         words = [sys.executable, "-m", "fem_reference", *words, "--out", str(path.parent), "--json", str(path)]
+        path.unlink(missing_ok=True)  # that of another case
         subprocess.run(words, cwd=ROOT, check=not case)
         found[case] = json.loads(path.read_text(encoding="utf-8"))
     if measurement.cases:

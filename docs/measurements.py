@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -42,6 +42,38 @@ _LIMITED = "--time-limit '120 s' " + " ".join(f"--program candidates/{name}" for
 _FAST_PROGRAMS = ("mujoco_flex", "pypbd_xpbd")
 _HARD = "at_rest bones degenerate fibres hip incompressible moved_away round_edge squeeze_bonded squeeze_sliding start twist"
 _TURNING = ("iliacus_anatomical", "gluteus_maximus_anatomical")
+_QUARTER = 50  # the frame at 0.5 rad
+
+
+def _traced(count: int, flux: str = "") -> str:
+    """The setting of ``count`` traced fibres."""
+    return f"""--set 'fibres.traced={{count={count},start="origin",end="insertion"{flux}}}'"""
+
+
+_POTENTIAL, _LENGTH = _traced(20), ("fibre_length", "mean", _QUARTER)
+_NO_TENDON = (
+    """--set fibres.complete=false --set 'attachment[2]={name="insertion",bone="femur",stiffness="100kPa/mm",outline={"""
+    """file="data:hip/landmarks.csv",unit="mm",clouds=["LC_SET_Ins_1_R_M081_Glut_Max"],reach="5mm"}}'"""
+)
+_SHIPPED = "--error-bar"  # what is asked for of the fibres as shipped alone
+# By case, its fibres as shipped, others, and the setting of these.
+_CHOICES = {
+    "hip_flexion": ("potential", "by area", _traced(25, ',flux="area"')),
+    "hip_flexion_tendon": ("potential", "by area", _traced(25, ',flux="area"')),
+    "adductor_brevis": ("by area", "potential", _POTENTIAL),
+    "gluteus_medius": ("by area", "potential", _POTENTIAL),
+    "gluteus_medius_anatomical": ("by area", "potential", _POTENTIAL),
+    "iliacus": ("by area", "potential", _POTENTIAL),
+    "iliacus_anatomical": ("by area", "potential", _POTENTIAL),
+    "iliacus_in_situ": ("by area", "potential", _POTENTIAL),
+    "gluteus_maximus": ("as given", "completed", "--set fibres.complete=true"),
+    "gluteus_maximus_anatomical": ("completed, with the tendon", "as given", _NO_TENDON),
+    "gluteus_maximus_tract": (
+        "completed, with the tendon",
+        "as given, with the tendon",
+        "--set fibres.complete=false",
+    ),
+}
 
 
 class Measurement(NamedTuple):
@@ -448,6 +480,59 @@ def _fibre_ends_rows() -> str:
     return table("fibre_ends", ("case", "covered share of attachments, %", "ends", beside, off_bone), rows)
 
 
+def _fibre_choice(found: dict[str, Any]) -> Any:
+    """By case and fibres the mean length at rest, its change and the moment arms, with the error bars of the fibres as shipped."""
+    rows = []
+    for command, one in found.items():
+        case, _, option = command.partition(" ")
+        own, bars = _values(one["measures"], "candidate"), _values(one["error_bars"], "of")
+        arms = [[own.get(("moment_arm", which, frame)) for which in _ARMS] for frame in (0, _QUARTER)]
+        known = [bars.get(key) for key in (_LENGTH, ("moment_arm", "mean", 0), ("moment_arm", "mean", _QUARTER))]
+        rows.append({"case": case, "fibres": _CHOICES[case][option != _SHIPPED], "status": one["status"]})
+        rows[-1] |= {
+            "length": one["mesh"]["fibre_length_mean_mm"],
+            "change": own.get(_LENGTH),
+            "arms": arms,
+            "bars": known,
+        }
+    return rows
+
+
+def _values(rows: list[dict[str, Any]], of: str) -> dict[tuple[str, str, int], float]:
+    """By metric, statistic and frame the values of the reference's own change."""
+    return {
+        (one["metric"], one["statistic"], one["frame"]): one["value"]
+        for one in rows
+        if one[of] in ("reference", "change")
+    }
+
+
+def _fibre_choice_rows() -> str:
+    """A row for each case: its fibres as shipped, and others."""
+    by_case = dict[str, list[dict[str, Any]]]()
+    for one in kept("fibre_choice")["measured"]:
+        by_case.setdefault(one["case"], []).append(one)
+    rows = []
+    for case, ones in by_case.items():
+        cells = [[one["fibres"], f"{one['length']:.1f}", *_choice_cells(one)] for one in ones]
+        ended = ", ".join(sorted({one["status"] for one in ones} - {"converged"}))
+        rows.append(
+            (f"`{case}`" + f" ({ended})" * bool(ended), *(" / ".join(pair) for pair in zip(*cells, strict=True)))
+        )
+    head = ("case", "fibres: shipped / others", "mean length at rest, mm", "its change to 0.5 rad, mm")
+    return table("fibre_choice", (*head, "arm at rest, mm", "arm at 0.5 rad, mm"), rows)
+
+
+def _choice_cells(one: dict[str, Any]) -> Iterator[str]:
+    """The change of the mean length, and the mean arms (least to greatest), each ± its error bar."""
+    for values, bar in zip(([one["change"]], *one["arms"]), one["bars"], strict=True):
+        if None in values:
+            yield one["status"]
+            continue
+        between = f" ({values[1]:.1f} to {values[2]:.1f})" if len(values) > 1 else ""
+        yield f"{values[0]:.1f}" + ("" if bar is None else f" ± {number(bar, 2)}") + between
+
+
 def _fronts(found: dict[str, Any]) -> Any:
     """A study of all solvers, with the errors and costs that are drawn."""
     case = found["cases"][0]
@@ -677,6 +762,11 @@ MEASUREMENTS = {
             *("gluteus_maximus", "gluteus_maximus_anatomical", "gluteus_maximus_tract"),
         ),
     ),
+    "fibre_choice": Measurement(
+        "./fem run CASE --set muscle.refinements=0 --set frames.last=60 --set frames.every=10 --set expect=[]",
+        _fibre_choice,
+        tuple(f"{case} {option}" for case, (*_, other) in _CHOICES.items() for option in (_SHIPPED, other)),
+    ),
     "fronts": Measurement(
         "./fem study hip_flexion --set muscle.refinements=0 --set frames.last=100 --set frames.every=50 --solver fenicsx "
         "--solver xpbd --solver pbd --solver arap --solver arap_pbd --solver mass_spring --solver viper",
@@ -715,6 +805,7 @@ TABLES = {
     "study_reference": _study_reference,
     "fronts_solvers": _fronts_rows,
     "fibre_ends": _fibre_ends_rows,
+    "fibre_choice": _fibre_choice_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
     "stress_programs_verdicts": _hard_programs_rows,

@@ -1,4 +1,4 @@
-"""Answers to what is asked of a study first: a setting within an error, at a rate of frames, and at the knee of the front."""
+"""Answers to the usual requests of a study: a setting within an error, at a rate of frames, and at the knee of the front."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,7 +25,8 @@ class Answer:
 def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
     """The answers for each error, for the rate, and for the knee."""
     requests = [*({"error": error} for error in ERRORS), {"time": 1 / RATE}]
-    of = {name: [one for one in known if one.point.solver == name] for name in dict.fromkeys(_solvers(known))}
+    names = dict.fromkeys(one.point.solver for one in known)
+    of = {name: [one for one in known if one.point.solver == name] for name in names}
     found = [
         (limits, chosen(known, limits), {name: chosen(some, limits)[0] for name, some in of.items()})
         for limits in requests
@@ -37,13 +38,9 @@ def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
     )
 
 
-def _solvers(known: Iterable[Expected]) -> list[str]:
-    return [one.point.solver for one in known]
-
-
 def knee(known: Iterable[Expected]) -> Expected | None:
     """The setting at the knee of the front of error against time: in logarithms, farthest below the line that joins its ends (Das
-    1999, Structural Optimization 18, 107-115). None of a front of fewer than three points, or of one that is nowhere below it.
+    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or nowhere below it.
     """
     front = list[Expected]()
     for one in sorted(known, key=lambda one: (one.time, one.error)):

@@ -10,15 +10,15 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The greatest error of a surrogate whose sensitivities are stated and whose band is taken, as a share of the variance.
+# The greatest error of a usable surrogate, as a share of the variance.
 WORST = 0.05
-# The share of runs that may lack: more of them might lie beyond the 5th or the 95th percentile, all of them.
+# The greatest share of missing runs: if more are missing, all of them might lie beyond the 5th or the 95th percentile.
 MISSING = 0.05
-# The fewest runs whose own 5th and 95th percentile are between their values.
+# The least number of runs whose own 5th and 95th percentile lie between their values.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
 _SAMPLES = 15  # as a power of 2
-_SHARE = 1e-6  # of the variance of a field, in what is left out of it
+_SHARE = 1e-6  # of the variance of a field, neglected in its principal components
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Design:
 
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
-    """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable once in each of so many equal parts of its range."""
+    """Points (runs, d) from -1 to 1 of a Latin hypercube: one value of each variable in each of ``runs`` equal parts."""
     from scipy.stats import qmc  # half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
@@ -85,7 +85,7 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
 def _banded(
     band: Band, design: Design, surrogate: GaussianProcess, defined: Floats, runs: Floats, predicted: Floats
 ) -> Band:
-    """The ``band`` by what a surrogate ``predicted`` (s, f), or where that is too bad by the ``runs`` (n, f) themselves."""
+    """The ``band`` from values ``predicted`` (s, f) by a surrogate or, if its error is too large, from the ``runs`` (n, f)."""
     band = replace(band, error=surrogate.error)
     if surrogate.error <= WORST:
         keys = [one.key for one in design.parameters]
@@ -109,13 +109,13 @@ def _filled(band: Band, defined: Floats, found: Floats) -> Band:
 
 
 def _samples(design: Design) -> Floats:
-    """Points at which a surrogate is asked."""
+    """Points at which a surrogate is evaluated."""
     from scipy.stats import qmc
 
     return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)
 
 
 def _not_numbers(values: Floats) -> str:
-    """The reason against values that are not all numbers, empty where they are."""
+    """The reason to refuse values that are not all numbers, empty where they are."""
     bad = int((~np.isfinite(values)).sum())
     return f"{bad} values of runs are not numbers" if bad else ""

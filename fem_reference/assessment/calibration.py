@@ -1,4 +1,4 @@
-"""Parameters of a case fitted to measurements: least squares, confidence intervals, and what the measurements do not determine."""
+"""Parameters of a case fitted to measurements: least squares, confidence intervals, and undetermined parameters."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,19 +19,19 @@ from fem_reference.io.texts import plain
 
 COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
-# Of a parameter's range: a step of differences, and how near to an end a value is at it.
+# Shares of a parameter's range: the step of finite differences, and the distance within which a value is at an end.
 _STEP, _AT = 1e-3, 1e-3
 # Estimates whose errors are correlated by more than this are named as a pair.
 _CORRELATED = 0.95
-# A combination of parameters is not determined at all where its singular value is below this share of the greatest.
+# A combination of parameters is undetermined if its singular value is below this share of the greatest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# The values (m,) that runs have where the data have theirs, for each of several points (d,) from 0 to 1 of the ranges; None for a
-# point without an answer.
+# The values (m,) of runs that correspond to the data, for each of several points (d,) from 0 to 1 of the ranges; None for a point
+# without an answer.
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
-# The most points that are asked, by parameter, besides differences.
+# The greatest number of evaluations per parameter, besides finite differences.
 _MOST = 50
-# Scatter beyond this, in standard deviations of the data, is not theirs.
+# The law fits the data if residuals scatter by at most this, in standard deviations of the data.
 FOLLOWED = 2.0
 _ENDED = "a run that the fit needs has no answer"
 
@@ -129,11 +129,11 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measu
 
 
 class _NoAnswerError(Exception):
-    """A point without an answer, where the fit cannot go on without one."""
+    """Raised at a point without an answer where the fit needs one."""
 
 
 class _Residuals:
-    """Differences between runs and measurements, in standard deviations, at points that are asked once each."""
+    """Differences between runs and measurements, in standard deviations, each point evaluated once."""
 
     def __init__(self, forward: Forward, rows: Sequence[Measurement]) -> None:
         self.forward, self.known = forward, dict[bytes, Floats]()
@@ -164,15 +164,15 @@ class _Residuals:
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
     """The parameters within their ranges whose values by ``forward`` are nearest to the measurements, in their standard deviations;
-    from the case's own values on. A point without an answer is stepped back from; at the start, or beside a point whose
-    sensitivities are asked, the fit ends there and says so. InputError where there are no more measurements than parameters.
+    the fit starts from the case's own values and steps back from a point without an answer. If that is the start, or a point for
+    sensitivities, the fit ends and states so. InputError where there are no more measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
     residuals = _Residuals(forward, rows)
     start = np.array([min(max(one.place(one.nominal), 0.01), 0.99) for one in parameters])
     try:
-        residuals.slopes(start)  # without an answer there nothing can begin
+        residuals.slopes(start)  # the fit cannot begin without an answer there
         found = least_squares(
             lambda point: residuals.at([point])[0],
             start,
@@ -191,7 +191,7 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
 
 
 def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
-    """The best point of a fit that could not go on, without intervals; and what is left there, NaN without any."""
+    """The best point of a fit that could not continue, without intervals; and the residuals there, NaN without any."""
     best, freedom = residuals.best(), len(residuals.values) - len(parameters)
     left = np.full(len(residuals.values), np.nan) if best is None else best[1]
     known = () if best is None else zip(parameters, best[0], strict=True)
@@ -209,7 +209,7 @@ def _finite(residuals: Floats) -> Floats:
 
 
 def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Parameter]) -> Calibration:
-    """Confidence intervals by Student's t from the singular values of the ``slopes`` (m, d), with what is ``left`` (m,)."""
+    """Confidence intervals by Student's t from the singular values of the ``slopes`` (m, d) and the residuals ``left`` (m,)."""
     freedom = len(left) - len(point)
     scatter = float(np.sqrt(left @ left / freedom))
     _, singular, rows = np.linalg.svd(slopes, full_matrices=False)
@@ -232,8 +232,8 @@ def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
 
 
 def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
-    """The titles of pairs whose errors are correlated, with the correlation: in what is not determined at all where both take part,
-    else in the ``covariance`` of the rest.
+    """The titles of pairs whose errors are correlated, with the correlation: in the undetermined combinations ``nothing`` where
+    both take part, else in the ``covariance`` of the rest.
     """
     lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
     for i, one in enumerate(parameters):

@@ -11,7 +11,7 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
-# The share by which the value of an experiment may differ from the pinned one: root finding, and other processors.
+# The relative difference allowed between the value of an experiment and the pinned one: root finding, and other processors.
 PINNED = 1e-5
 
 
@@ -74,10 +74,10 @@ class Entry:
     ``negative_control`` names one mistake, with which ``wrong`` replaces a part of ``given``: it must fail. ``slow``: a
     measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify measures these.
 
-    An entry of the kind "experiment" lays a model beside a muscle: its word is within or outside the uncertainty of the
-    experiment, and neither fails. It fails where the value is not the ``pinned`` one any more. ``facts``: the measured numbers
-    that its truth is made of; ``is_order``: True where it is an order, which is met (1) or not (0), to a half; ``from_memory``:
-    True where a part of its model or of its source is from memory.
+    An entry of the kind "experiment" compares a model with a muscle: its word is within or outside the uncertainty of the
+    experiment, and neither is a failure. It fails where the value is no longer the ``pinned`` one. ``facts``: the measured numbers
+    from which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half; ``from_memory``: True
+    where a part of its model or of its source is from memory.
     """
 
     name: str
@@ -184,7 +184,7 @@ class Verification:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass; an experiment's does, within its uncertainty or outside."""
+        """The results that do not pass; experiments within or outside their uncertainty do."""
         return tuple(one for one in self.results if one.word not in ("pass", "within", "outside"))
 
     @property

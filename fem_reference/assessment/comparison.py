@@ -133,6 +133,7 @@ def compare(
 ) -> Comparison:
     """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
     ``candidates`` have all frames of the case, NaN where one was not reached; where ``error_bars`` are too wide, nothing is judged.
+    InputError where a case expects a measure of a named run that the run lacks, as it has no surface.
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
@@ -141,7 +142,10 @@ def compare(
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
     changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
-    _check_expected(case, measured)
+    for i, one in enumerate(map(resolved, case.expect)):
+        if one.of in measured and not _is_measured(one, measured[one.of]):
+            got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
+            raise InputError(join(case.place, f"expect[{i}]"), got, "a measure of lines")
     verdicts = tuple(
         verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
         for expectation in map(resolved, case.expect)
@@ -172,14 +176,6 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
     expected = [one for one in map(resolved, case.expect) if one.of == run.name and _is_measured(one, measures)]
     verdicts = tuple(verdict(one, measures, run.numbers) for one in expected)
     return Alone(measures, verdicts, doubted(overall(one.word for one in verdicts), doubts(run)))
-
-
-def _check_expected(case: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
-    """Raise InputError where a case expects a measure of a named run that the run lacks, as it has no surface."""
-    for i, one in enumerate(map(resolved, case.expect)):
-        if one.of in measured and not _is_measured(one, measured[one.of]):
-            got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
-            raise InputError(join(case.place, f"expect[{i}]"), got, "a measure of lines")
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:

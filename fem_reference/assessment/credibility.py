@@ -19,15 +19,14 @@ from fem_reference.foundations.records import Record, parse
 FILE = Path(__file__).with_suffix(".toml")
 _ROUNDED = 0.5  # of a share that is published in whole per cent
 _WHOLE = 100.0  # per cent of the poses
-_READ = ("publication", "abstract", "quotation", "memory")  # from the best on
+_READ = ("publication", "abstract", "quotation", "memory")  # the best first
 # "outside": the model differs from a measurement by more than its uncertainty, whatever else it meets.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
 class Evidence(Record):
-    """The evidence of a quantity as it is stated: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in
-    words, the numerical ``bar``, facts that are its model ``band``, and its comparisons with experiments; ``compared``: what of it
-    these compare, in words.
+    """The stated evidence of a quantity: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in words, the
+    numerical ``bar``, facts of its model ``band``, and its comparisons with ``experiments``, described in words by ``compared``.
     """
 
     name: str
@@ -55,9 +54,9 @@ def claims() -> tuple[Evidence, ...]:
 @dataclass(frozen=True)
 class Beside:
     """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
-    specimens, None where unknown; ``validates``: whether being within would count as validation; ``rests_on``: where the truth
-    was read, and what of it or of the model nobody measured; ``kind``: measurement, or model where another model is the truth;
-    ``is_order``: True of an order, which is met (1) or not (0), to a half.
+    specimens, None where unknown; ``validates``: True if being within counts as validation; ``rests_on``: the text in which the
+    truth was read, and the unmeasured parts of truth or model; ``kind``: measurement, or model where another model is the truth;
+    ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -101,7 +100,7 @@ class Row:
 
     @property
     def models(self) -> tuple[int, int]:
-        """The number of other models that are as near as was asked for, and of all; they are no evidence of a muscle."""
+        """The number of other models within their tolerance, and of all; they are no evidence about muscles."""
         return count(self.beside, "model")
 
     @property
@@ -180,8 +179,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms beside a measured curve, which is to be inside in all poses, or beside another model's range, of which as much is
-    to be covered [%] as Modenese and Kohout 2020 cover.
+    """Moment arms beside a measured curve, which should be inside in all poses, or beside another model's range, of which the arms
+    should cover as much [%] as those of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"

@@ -1,7 +1,6 @@
 """Sizes of differences between two runs; where one frame or statistic is small by chance, the average counts."""
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +62,12 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
-    means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
+    means = dict[str, float]()
+    for name in set(metrics):
+        known = [
+            share for metric, share in zip(metrics, shares, strict=True) if metric == name and math.isfinite(share)
+        ]
+        means[name] = math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
     by_name, sizes = dict(zip(names, deviations, strict=True)), []
     for (metric, statistic), found, deviation in zip(names, changes, deviations, strict=True):
         kind = statistic.partition("_")[0]
@@ -72,12 +76,6 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
         average = statistic.replace(kind, _OF_ONE_PLACE.get(kind, kind))
         sizes.append(np.maximum(size, by_name.get((metric, average), size)) if kind in _OF_ONE_PLACE else size)
     return sizes
-
-
-def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
-    """The root mean square of the known shares of the metric ``wanted``, 0 if there are none."""
-    known = [share for metric, share in shares if metric == wanted and math.isfinite(share)]
-    return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
 
 
 def carried(run: Run, moved: Floats) -> dict[str, Floats]:

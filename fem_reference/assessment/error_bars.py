@@ -28,15 +28,14 @@ FILE = "error_bar.json"
 FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# A greater factor for a single fibre, of the few that there are: nothing averages there, and a pair of sizes is weaker
-# evidence than three (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions
-# (docs/error_bars.md).
+# An additional factor for a single fibre: nothing averages there, and two sizes are weaker evidence than three (Roache takes 3
+# for two). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
 # The rest of an error of first order, relative to the change of the result when its cause is halved. For the cells of a body this
 # is the least order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
 # The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where
-# displacement goes with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
+# displacement grows with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
 # other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 # The share of a force or moment that changes where the same springs are spread over facets instead of points of the surface:

@@ -22,8 +22,8 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where they are known, ``how``
-    the publication has it, and the text that it was ``read_in``.
+    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where known, ``how`` it was
+    taken from the publication, and the kind of text in which it was read (``read_in``).
     """
 
     experiment: str
@@ -46,9 +46,9 @@ class Fact(Record):
 
 
 class Experiment(Record):
-    """An experiment, of the ``kind`` measurement, model or, of numbers of several publications, bands: its ``specimen``, its
-    ``boundary`` conditions, what our scene repeats of it and what not; ``file``, in the folder of ``FEM_REFERENCE_DATA``: a whole
-    curve.
+    """An experiment of a ``kind``: measurement, model, or bands (numbers of several publications). Its ``specimen``, its
+    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a whole curve, in the folder of
+    ``FEM_REFERENCE_DATA``.
     """
 
     title: _Text
@@ -92,7 +92,7 @@ def _own() -> tuple[Fact, ...]:
 
 
 def find(experiment: str, quantity: str, condition: str) -> Fact:
-    """The fact of an ``experiment`` whose condition has the words of ``condition``; LookupError where there is not one alone."""
+    """The fact of an ``experiment`` whose condition has the words of ``condition``; LookupError unless there is exactly one."""
     found = [
         one for one in _own() if (one.experiment, one.quantity) == (experiment, quantity) and condition in one.condition
     ]
@@ -102,7 +102,7 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
 
 
 def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
-    """The least and greatest difference of models of muscles from muscles, in a ``quantity``; empty where no source says."""
+    """The least and greatest difference of models of muscles from muscles, in a ``quantity``; empty without a source."""
     return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
 
 

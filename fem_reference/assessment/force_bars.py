@@ -1,7 +1,7 @@
 """Error bars of the force on each bone and of its moment about the origin, as lengths of vectors.
 
-The rule is that of ``joint_moment``; a difference of two runs is the length of that of their vectors, so that no component has a
-short bar where it crosses zero. Two bones between which a muscle is in balance have the same bars.
+The rule is that of ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so that no
+component has a short bar where it crosses zero. Two bones between which a muscle is in balance have the same bars.
 """
 
 import numpy as np
@@ -30,7 +30,12 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
             bar = together(parts, np.ones(len(moved), bool))
-            bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, _model(pair, kind, bone)))
+            model = (
+                SPREAD * _length(kind, bone, pair.fine) if pair.springs else None
+            )  # of springs spread in another way
+            if model is not None and pair.exact is not None:
+                model = np.fmax(model, _length(kind, bone, pair.exact, pair.coarse))
+            bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, model))
     return tuple(bars)
 
 
@@ -44,11 +49,3 @@ def _length(kind: str, bone: str, run: Run, other: Run | None = None) -> Floats:
     """The length (f,) of the force or moment on a ``bone``, or of its difference from that of an ``other`` run."""
     vectors = [one.force(bone) if kind == "force" else one.moment(bone) for one in (run, other) if one is not None]
     return np.asarray(np.linalg.norm(vectors[0] - (vectors[1] if other else 0.0), axis=1))
-
-
-def _model(pair: Pair, kind: str, bone: str) -> Floats | None:
-    """The change (f,) by another model of springs: by exact attachments, where known, and by springs spread in another way."""
-    if not pair.springs:
-        return None
-    spread = SPREAD * _length(kind, bone, pair.fine)
-    return spread if pair.exact is None else np.fmax(spread, _length(kind, bone, pair.exact, pair.coarse))

@@ -1,4 +1,4 @@
-"""Fronts of accuracy against cost: measured settings as points, those that no other beats, and the price of half the error.
+"""Fronts of accuracy against cost: points of measured settings that no other point beats, and the price of half the error.
 
 Settings are compared at the same error or the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
 Wanner 1993, Solving Ordinary Differential Equations I, II.10).
@@ -38,7 +38,7 @@ _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 @dataclass(frozen=True)
 class Point:
     """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default)
-    and its ``value`` as text; ``choice``, all that is needed to repeat it; its outcome.
+    and its ``value`` as text; ``choice``: everything needed to repeat it; its outcome.
 
     ``errors``: by ``metric.statistic``, the greatest magnitude over the frames of the deviation from the truth; ``costs``: by
     name, those of ``COSTS`` that it has, and seconds by phase.

@@ -1,9 +1,9 @@
 """A Gaussian process: a function of a few uniform variables from its values in runs, and its sensitivities.
 
-A linear trend, and about it a process whose covariance is the exponential of minus the square of the distance, over a length of its
-own in each variable. Lengths and noise are those of the greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for
-Machine Learning, sections 2.7 and 5.4.1), with the trend and one variance of all outputs at their best. Sobol's indices are
-sampled: those of a variable alone as Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), with others as Jansen 1999.
+It has a linear trend and a squared exponential covariance with a length scale for each variable. Lengths and noise have the
+greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and 5.4.1), each with the
+optimal trend and one optimal variance of all outputs. Sobol's indices are sampled: those of a variable alone as in Saltelli et al.
+2010 (doi 10.1016/j.cpc.2009.09.018), those with others as in Jansen 1999.
 """
 
 from dataclasses import dataclass, replace
@@ -54,7 +54,7 @@ class GaussianProcess:
     @cached_property
     def _shares(self) -> Floats:
         """The shares (2, d), by samples of two independent points in which one variable at a time is exchanged."""
-        from scipy.stats import qmc  # half a second, for what is asked of few processes
+        from scipy.stats import qmc  # importing takes half a second, and few processes need it
 
         variables = self.points.shape[1]
         both = 2 * qmc.Sobol(2 * variables, rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1

@@ -1,8 +1,9 @@
 """Quantities that show whether a run is stable, by frame and with the worst place: 0 for a healthy run."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,10 @@ from fem_reference.assessment.stress import History
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import outer_windings
+from fem_reference.geometry.interpenetration import penetration as depth_of
 from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.problems.joining import Span
+from fem_reference.problems.overlaps import through_itself
 from fem_reference.problems.setup import Bone
 
 
@@ -22,7 +26,7 @@ class Followed:
     that are ``free`` (n,) may be in contact; ``truth`` (f, n, 3), the vertices of the reference, where they are the same;
     ``integrated`` (f,), V/V0 from the solver itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the
     material certainly has, and ``least_determinant`` (f,), the least det F, where known; or a scalar field's ``values`` (f, N)
-    and the ``range`` of its boundary values.
+    and the ``range`` of its boundary values. ``spans``: the parts that are of each body, where there are several.
     """
 
     numbers: tuple[int, ...]
@@ -39,6 +43,24 @@ class Followed:
     least_determinant: Floats | None = None
     values: Floats | None = None
     range: tuple[float, float] = (0.0, 0.0)
+    spans: tuple[Span, ...] = ()
+
+    @cached_property
+    def bodies(self) -> "tuple[Followed, ...]":
+        """The run of each body; itself where there is one."""
+        return tuple(map(self._of, self.spans)) or (self,)
+
+    def _of(self, span: Span) -> "Followed":
+        """The surface and the tetrahedra of the body at a ``span``."""
+        triangles, mesh, nodes = self.surface.triangles - span.vertices.start, self.mesh, self.nodes
+        own = ((triangles >= 0) & (triangles < span.vertices.stop - span.vertices.start)).all(axis=1)
+        if mesh is not None and nodes is not None:
+            mesh = replace(
+                mesh, points=mesh.points[span.points], tets=mesh.tets[span.cells] - span.points.start, facets={}
+            )
+            nodes = nodes[:, span.points]
+        surface = Surface(self.surface.points[span.vertices], triangles[own])
+        return Followed(self.numbers, surface, self.positions[:, span.vertices], mesh, nodes)
 
     @property
     def size(self) -> float:
@@ -157,6 +179,20 @@ def pierced(run: Followed) -> Found:
     return 100 * values / run.size, None, places
 
 
+def crossed(run: Followed) -> Found:
+    """Greatest depth to which bodies, or places of one, go through each other, in per cent of the size: 0 where an exact test finds
+    that no triangles of their surfaces intersect; of one body, where these do not already at rest.
+    """
+    values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
+    for i, finite in enumerate(np.isfinite(run.positions).all(axis=(1, 2))):
+        if finite:
+            now = [one.surface.moved_to(one.positions[i]) for one in run.bodies]
+            found = [through_itself(there, one.surface) for there, one in zip(now, run.bodies, strict=True)]
+            found += [depth_of(*pair) for pair in combinations(now, 2)]
+            values[i], places[i] = max(found, key=lambda one: one[0])
+    return 100 * values / run.size, None, places
+
+
 def overshoot(run: Followed) -> Found:
     """Greatest distance of a scalar field from the range of its boundary values, in per cent of that range."""
     assert run.values is not None  # asked of scalar fields only
@@ -178,7 +214,7 @@ def _worst(run: Followed, each: Floats) -> Found:
 
 
 _SHAPE = (volume, inside_out, from_rest, from_first, from_reference, stretch)
-_CONTACT = (penetration, passed, pierced)
+_CONTACT = (penetration, passed, pierced, crossed)
 QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one in (*_SHAPE, *_CONTACT, overshoot)}
 
 

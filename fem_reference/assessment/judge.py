@@ -50,9 +50,8 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass where ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail where for none of them, else
-    inconclusive (all four in one unit). A value that is not a number fails; an unknown truth, tolerance or bar makes it
-    inconclusive.
+    """Pass if ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail if for no such truth, else
+    inconclusive (all four in one unit). A value that is not a number fails; an unknown truth, tolerance or bar is inconclusive.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
     ('pass', 'fail', 'inconclusive')

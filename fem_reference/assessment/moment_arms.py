@@ -105,8 +105,8 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean of the fibres' mean arm less the published one, of a range its middle, over the poses where that is known [mm];
-        NaN for none.
+        """The mean [mm] over the known poses of the fibres' mean arm minus the published arm, or the middle of its range; NaN for
+        none.
         """
         return float(self._off.mean()) if self._off.size else float("nan")
 

@@ -1,9 +1,9 @@
-"""Cubes of muscle under load: what experiments measured of them, and the same quantities of a material."""
+"""Cubes of muscle under load: quantities measured in experiments, and the same quantities of a material."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -22,9 +22,9 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty
-    ``within`` ``because`` of what; ``of`` gives it of a material. ``limit``: the reason why the shipped law cannot reach it.
-    ``is_order``: True of an order, which is met (1) or not (0), to a half.
+    """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
+    its reason (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach it.
+    ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -70,22 +70,12 @@ def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
     return lambda material: stress(material, stretch, 0) / stress(material, stretch, 90)
 
 
-def _extreme(material: Material, degrees: float, *, softest: bool) -> float:
-    """1 where the cube whose fibres are at ``degrees`` is softer or stiffer than the others of 0, 45 and 90 by 1 %, else 0."""
+def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
+    """1 where the cube with fibres at ``degrees`` is softest, or stiffest, of those at 0, 45 and 90 degrees, by 1 %, else 0."""
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)
     clear = own < (1 - _CLEAR) * min(found.values()) if softest else own > (1 + _CLEAR) * max(found.values())
     return float(clear)
-
-
-def softest_midway(material: Material) -> float:
-    """1 where the cube is softest with fibres at 45 degrees, else 0."""
-    return _extreme(material, 45.0, softest=True)
-
-
-def stiffest_across(material: Material) -> float:
-    """1 where the cube is stiffest in compression across its fibres, else 0."""
-    return _extreme(material, 90.0, softest=False)
 
 
 def confinement(material: Material) -> float:
@@ -160,6 +150,7 @@ def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], l
 
 
 _MIDWAY, _ACROSS = find(LOOCKE, "softest_angle", ""), find(WALTER, "stiffest_angle", "")
+_SOFTEST, _STIFFEST = partial(_extreme, degrees=45.0, softest=True), partial(_extreme, degrees=90.0, softest=False)
 _OTHER = "the other way across"
 
 QUANTITIES = (
@@ -171,8 +162,8 @@ QUANTITIES = (
         "cube_poisson_across", f"across its fibres: Poisson ratio {_OTHER}", "across the fibres; strain across", 90, 2
     ),
     _ratio_by_symmetry(),
-    _order("cube_softest_midway", "softest with fibres at 45 degrees", _MIDWAY, softest_midway, _TENSION_ONLY),
-    _order("cube_stiffest_across", "stiffest across its fibres (soleus of rabbits)", _ACROSS, stiffest_across),
+    _order("cube_softest_midway", "softest with fibres at 45 degrees", _MIDWAY, _SOFTEST, _TENSION_ONLY),
+    _order("cube_stiffest_across", "stiffest across its fibres (soleus of rabbits)", _ACROSS, _STIFFEST),
     _confinement(),
     _tension(),
     _pulled("strip_poisson_fibre", "along them", "across the fibres; strain along", 1),

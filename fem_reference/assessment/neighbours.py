@@ -14,13 +14,13 @@ from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.touching import pressure_name
 from fem_reference.runs.store import Run
 
-# Facets of tetrahedra are curved, and their corners are straight: where two are pressed, this share of an edge lies between.
+# The allowed gap between curved facets of pressed tetrahedra and the flat triangles of their corners, as a share of an edge.
 _BULGE = 0.05
 
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
     """The check that no muscle is in another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
-    Allowed are the give of contact under the pressure of the two, and what facets bulge. Not met where no tetrahedra are stored.
+    Allowed are the compliance of contact under its pressure and the bulge of facets. Not met where no tetrahedra are stored.
     """
     if not problem.apart:
         return ()
@@ -47,7 +47,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """For each two of the muscles by name, their depth (f,) [mm] in each other at the frames of their ``runs``, NaN where one has
+    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN where one has
     no surface.
     """
     for one, other in combinations(runs, 2):

@@ -282,14 +282,10 @@ def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
         cases = sorted({case for values in settings.values() for case in values})
         everywhere = {label: values for label, values in settings.items() if len(values) == len(cases)}
         for left_out in cases if len(cases) > 1 and everywhere else ():
-            chosen = _chosen(everywhere, cases, left_out)
+            others = [case for case in cases if case != left_out]
+            means = {key: fmean(math.log(values[case]) for case in others) for key, values in everywhere.items()}
+            chosen = min(means, key=lambda key: means[key])
             errors = everywhere[chosen][left_out], min(values[left_out] for values in everywhere.values())
             default = defaults.get((solver, left_out), math.nan)
             found.append(Transfer(solver, left_out, labels[chosen, left_out], *errors, default))
     return tuple(found)
-
-
-def _chosen(settings: dict[str, dict[str, float]], cases: Iterable[str], left_out: str) -> str:
-    """The key of the settings with the least mean logarithm of the error over all ``cases`` but the one ``left_out``."""
-    others = [case for case in cases if case != left_out]
-    return min(settings, key=lambda label: fmean(math.log(settings[label][case]) for case in others))

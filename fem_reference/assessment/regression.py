@@ -52,14 +52,14 @@ class Judgement:
     def why(self) -> str:
         """The reason in words."""
         if math.isnan(self.was) and math.isnan(self.current):
-            return "there is no number, and there was none"
+            return "there is no number now, and there was none before"
         if math.isnan(self.current):
             return "there is no number now"
         if self.question == "unchanged" and math.isnan(self.was):
-            return "there is a number now, and there was none"
+            return "there is a number now, and there was none before"
         if self.word == "inconclusive":
-            return self._why_silent
-        start = "what it was" if self.question == "unchanged" else "the reference"
+            return self._why_inconclusive
+        start = "the baseline" if self.question == "unchanged" else "the reference"
         much, most = (f"{value:.4g} {self.unit}" for value in (self.away, self.allowed))
         return f"{much} from {start}, {most} allowed{self._direction}"
 
@@ -72,14 +72,14 @@ class Judgement:
         return f": was {self.was:.4g}, now {self.current:.4g} {self.unit}, {where} the reference"
 
     @property
-    def _why_silent(self) -> str:
+    def _why_inconclusive(self) -> str:
         if math.isnan(self.known):
             return "the error bar of the reference is unknown; --error-bar measures it"
         if math.isnan(self.allowed):
             return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
         text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
-        return f"{text}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
+        return f"{text}, and {self.away:.4g} {self.unit} is within it of the {self.allowed:.4g} {self.unit} allowed"
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class _Frames(NamedTuple):
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     """Judge whether the sampled vertices are unchanged, by the greatest distance [mm] of each frame."""
     was = positions.points(len(current.rest), "baseline")
-    with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
+    with np.errstate(over="ignore"):  # squares of huge distances, which count as infinite
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
     frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
@@ -173,7 +173,7 @@ def _word(was: float, value: float, truth: float, bar: float, *, allowed: float)
 
 
 def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement]) -> Iterator[str]:
-    """Notes that explain the judgements, and name what was not judged."""
+    """Notes that explain the judgements, and name statistics that were not judged."""
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
     if baseline.reference != current.reference_name:
@@ -181,8 +181,8 @@ def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement])
     changed = any(one.word == "fail" and one.question == "unchanged" for one in found if one.name != MOVED)
     if changed and all(one.word == "pass" for one in found if one.name == MOVED):
         yield (
-            "no sampled vertex moved and yet measures changed: either the reference is another, or the candidate moved "
-            "between the sampled vertices"
+            "no sampled vertex moved, but measures changed: either the reference differs, or the candidate moved between the "
+            "sampled vertices"
         )
     left = sorted(current.by_name.keys() - baseline.measures.keys())
     if left:

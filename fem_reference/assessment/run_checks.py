@@ -62,7 +62,9 @@ class RunCheck:
 
     @property
     def share(self) -> float:
-        """The value over the allowed one; infinite where either is not a number."""
+        """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
+        if self.allowed == 0:
+            return 0.0 if self.met else math.inf
         return math.inf if math.isnan(share := self.value / self.allowed) else share
 
     def __str__(self) -> str:
@@ -205,8 +207,8 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else what
-    the bones carry of these. An effect of a user's own may be such a load, so that nothing is known with one.
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else equal to
+    these. An effect of a user's own may be such a load, so there is no check with one.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -254,8 +256,8 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            give = _give(problem, bone, float(pressures[i]), apart)
-            check_of = partial(_deep, bone, number, give, pressed=bool(pressures[i] > 0))
+            allowed = give(problem, bone, float(pressures[i]), apart)
+            check_of = partial(_deep, bone, number, allowed, pressed=bool(pressures[i] > 0))
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
@@ -278,9 +280,9 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 
-def _give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] of a bone: the give of contact under the recorded ``pressure`` [MPa], the error of the bone's
-    distance, and the part between contact points, which are half of ``apart`` [mm] apart.
+def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
+    """The allowed penetration [mm] of a bone: the compliance of contact under the recorded ``pressure`` [MPa], the error of the
+    bone's distance, and the part between contact points, which are half of ``apart`` [mm] apart.
     """
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0

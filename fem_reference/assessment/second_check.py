@@ -72,13 +72,15 @@ def _some(nodes: Nodes, points: slice, number: int) -> Floats | None:
     return None if (found := nodes(number)) is None else found[points]
 
 
-def confirmed_frames(problem: MuscleProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
-    """The ``outcome`` of ``frames`` of a muscle in memory, denied where the check denies that they converged."""
+def confirmed_frames(
+    problem: MuscleProblem | MusclesProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record
+) -> Outcome:
+    """The ``outcome`` of ``frames`` of muscles in memory, denied where the check denies that they converged."""
     if outcome.status != "converged":
         return outcome
     run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})
     tets = {frame.number: frame.points for frame in frames if len(frame.points)}
-    return confirmed(outcome, of_muscle(problem, run, tets.get))
+    return confirmed(outcome, _of_all(problem, run, tets.get))
 
 
 def texts_of(run: Run) -> tuple[str, ...]:

@@ -60,8 +60,8 @@ def _file() -> _File:
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
     against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
-    parameters that somebody must give it, by where they are given; empty where that is not known. ``unsound``: why its frames are
-    no answer, empty where they are one.
+    parameters that a user must give, by kind; empty where that is not known. ``unsound``: the reason why its frames are no
+    answer, empty where they are one.
     """
 
     kind: str
@@ -131,7 +131,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene where they are most; empty where that is not known."""
+        """The parameters that ``name`` needs on the scene with most of them; empty where that is not known."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 

@@ -1,4 +1,4 @@
-"""Reasons why the frames of a candidate are no answer, though every number is finite: it is named and never ranked."""
+"""Reasons why the frames of a candidate are no answer although every number is finite; such a candidate is not ranked."""
 
 import numpy as np
 
@@ -6,25 +6,25 @@ from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
 from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
-# The enclosed volume over that of the reference: less is collapsed, more is exploded. No solver that follows the motion at all is
-# near either; the worst of those shipped is at 0.8.
+# The enclosed volume over that of the reference: below the first the body has collapsed, above the second it has exploded. The
+# worst of the shipped solvers is at 0.8.
 _LEAST, _MOST = 0.5, 2.0
 # The greatest distance of a vertex from the reference, over the size of the body.
 _FARTHEST = 1.0
-# The share of the surface that is inside out beyond that of the reference.
+# The share of the surface that may be inside out, beyond that of the reference.
 _TURNED = 0.05
-# A vertex is stuck that moves less than the first, where the reference moves by more than the second, over the size of the body.
+# A vertex is stuck if it moves by less than the first, and the reference by more than the second, in sizes of the body.
 _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason that the frames of a ``run`` (f, n, 3) [mm] give, with its frame; empty where they are an answer, and for a
-    run without this surface. Only frames count that both reached, as others are not numbers.
+    """The first reason why the frames of a ``run`` are no answer, with its frame; empty where they are one, and for a run without
+    this surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # lines, or another surface
     if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
-        return "unknown: no frame is of numbers alone"
+        return "unknown: no frame without values that are not numbers"
     both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
     for i in np.flatnonzero(both):
         if why := _of_frame(run, run.positions[i], reference.positions[i]):
@@ -50,7 +50,7 @@ def _inside_out(run: Run, points: Floats) -> float:
 
 
 def _stuck(mine: Floats, truth: Floats) -> str:
-    """The vertices that rest in all frames while the reference moves them: those of elements that a solver dropped."""
+    """The reason if vertices rest in all frames although the reference moves them, as for elements that a solver dropped."""
     size = diagonal(truth[0])
     moved, wanted = (np.linalg.norm(one - one[0], axis=2).max(axis=0) / size for one in (mine, truth))
     stuck = (moved < _STILL) & (wanted > _MOVES)

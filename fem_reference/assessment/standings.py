@@ -1,4 +1,4 @@
-"""Rows of standings: what each solver reached on each case, with provenance; which are stale, and what changed since before."""
+"""Rows of standings: the result of each solver on each case, with provenance; stale rows, and changes of standings."""
 
 import math
 from collections.abc import Collection, Iterable, Sequence
@@ -10,10 +10,10 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 
-# Of what is measured and how: rows of another number are stale.
+# The version of the method of measurement: rows of another version are stale.
 PROTOCOL = 3
 STATES = ("failed", "stale")
-# What rows are compared by, [mm]; its value in other units; and where it is matched: an error [mm], the time of a frame number [s].
+# The statistic by which rows are compared [mm], and the same in per cent; the matched error [mm] and time of a frame number [s].
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
 MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 
@@ -21,10 +21,10 @@ MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
     empty for the reference, which has ``bars``. ``from_rest``: root mean square [mm] from the first to the last frame where the
-    reference is back at rest. ``unsound``: why its frames are no answer. ``split``: by part the root mean square [mm] of its error.
-    ``least_error`` [mm] where it is within the matched time, ``least_time`` [s] where within the error.
-    ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: when it was measured; ``stale``:
-    True where case, reference, solver, protocol or time limit changed since; ``time_limit``: its processor time [s] at most.
+    reference is back at rest. ``unsound``: the reason why its frames are no answer. ``split``: root mean squares [mm] of the parts
+    of its error. ``least_error`` [mm] if it is within the matched time, ``least_time`` [s] if within the matched error. ``truth``
+    and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: that of the measurement; ``stale``: True where
+    case, reference, solver, protocol or time limit changed since; ``time_limit``: its greatest processor time [s].
     """
 
     case: str
@@ -57,7 +57,7 @@ class Standing(Record):
 
     @property
     def ended(self) -> str:
-        """Its end in words: why its frames are no answer, the limit that it did not keep, or its status."""
+        """Its end in words: the reason why its frames are no answer, the limit that it exceeded, or its status."""
         late = self.status == "timed out" and self.time_limit is not None
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
@@ -66,16 +66,16 @@ class Standing(Record):
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row where its case was not made anew; ``missing``: because that could not be."""
+        """The row if its case was not measured again; ``missing``: True if that was not possible."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
-        """True where it is to be made anew: ``only`` some states, or all where that is empty."""
+        """True where it should be measured again: in the states ``only``, or always if that is empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
 
 
 class Standings(Record):
-    """The ``rows``; ``missing``: by case, or case and solver, why there is none; ``changes`` since those before, in words."""
+    """The ``rows``; ``missing``: the reason for none, by case, or case and solver; ``changes`` since the last, in words."""
 
     rows: tuple[Standing, ...]
     missing: dict[str, str]
@@ -88,7 +88,7 @@ class Standings(Record):
         return list(dict.fromkeys(row.case for row in self.rows))
 
     def of(self, case: str) -> list[Standing]:
-        """The rows of a case, by group and error; what failed comes last in its group, in no order."""
+        """The rows of a case, by group and error; failed ones come last in their group, in no order."""
         groups = list(dict.fromkeys(row.group for row in self.rows))
         return sorted(
             (row for row in self.rows if row.case == case),
@@ -145,7 +145,7 @@ def load(path: Path) -> tuple[Standing, ...]:
 
 def changes(before: Iterable[Standing], after: Iterable[Standing]) -> tuple[str, ...]:
     """Rows that are new, gone, or of another status, and errors that changed by more than the error bar of the reference, in
-    words; nothing where there was nothing ``before``.
+    words; empty without rows ``before``.
     """
     old, new = ({(row.case, row.name): row for row in rows} for rows in (before, after))
     if not old:

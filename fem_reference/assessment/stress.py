@@ -12,13 +12,13 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.io.texts import plain
 
-# Not applicable: the solver does not take the case. No solution: physics has no answer, and the solver says so.
+# Not applicable: the solver does not accept the case. No solution: no equilibrium exists, and the solver reports that.
 Verdict = Literal["ok", "degraded", "failed", "not applicable", "no solution", "inconclusive"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound of healthy runs: a ``quantity`` of ``assessment.health`` at most ``at_most``, at every frame or at the ``last``."""
+    """A bound of healthy runs: a ``quantity`` of ``assessment.health`` is at most ``at_most``, at every or the ``last`` frame."""
 
     quantity: str
     at_most: float = Field(ge=0)
@@ -110,9 +110,9 @@ Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, for a run that reached every frame, with the verdict on its bounds: by the first that is violated, else the first
-    of all. A value that is not finite fails, in spite of the status; so does a case that has to violate its bound as a
-    ``contrast``, and does not.
+    """``cell``, for a run that reached every frame, with the verdict on its bounds: on the first violated one, else the first of
+    all. A value that is not finite fails, whatever the status; so does a ``contrast``, which should violate its bound, but does
+    not.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
@@ -125,8 +125,8 @@ def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, for a run that ended with another status: failed; or no solution where it came to a limit point, or came some way
-    and found that there is ``no_solution``, for the given reason.
+    """``cell``, for a run that ended with another status: failed; or no solution if it ended at a limit point, or reached some
+    frames of a case that has ``no_solution``, for the given reason.
     """
     shown = _decisive(cell, weighed)
     if cell.status == "limit point":
@@ -138,7 +138,7 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's own result, if any: no plain success; right where there is ``no_solution``."""
+    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, but correct where there is ``no_solution``."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:

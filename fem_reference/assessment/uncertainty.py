@@ -68,12 +68,12 @@ class Failure:
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
     ``high`` (f,) beside the case's own answer ``nominal``; NaN where the quantity is not defined. ``bar`` (f,): the numerical error
-    bar of that answer, None where it has none. ``distance``: True of a distance from that answer, where less is always inside.
+    bar of that answer, None where it has none. ``distance``: True for a distance from that answer; less is then always inside.
 
     ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN where there is none.
-    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: why there is no band, empty where
-    there is one. ``first`` and ``total``: by key of the parameter the share of the variance over all frames; empty where the
-    surrogate is too bad to say (``unreliable``).
+    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, empty
+    where there is one. ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty where the
+    surrogate is not accurate enough (``unreliable``).
     """
 
     quantity: str
@@ -139,9 +139,10 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The bands of a case from so many ``runs`` of a design with a ``seed``, of which some are ``failures``; ``fixed``: titles of
-    the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: by candidate, why it has no run; ``seconds``:
-    processor time of a run, on the mean; ``refused``: why there are no runs, as the case itself has no solution, else empty.
+    """The bands of a case from a number of ``runs`` of a design with a ``seed``, some of them ``failures``; ``fixed``: titles of
+    the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: the reasons why candidates have no run;
+    ``seconds``: mean processor time of a run; ``refused``: the reason why there are no runs, if the case itself has no solution,
+    else empty.
     """
 
     case: str
@@ -161,8 +162,8 @@ class Uncertainty:
 
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
-    """A candidate's ``values`` (f,) beside a band: inside and outside by more than the error bar of the reference, else undecided;
-    without a bar nothing is certain. A value that is not finite is no answer.
+    """A candidate's ``values`` (f,) beside a band: inside or outside by more than the error bar of the reference, else undecided,
+    as without a bar. A value that is not finite is no answer.
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low
@@ -179,7 +180,7 @@ def place(candidate: str, band: Band, values: Floats) -> Placed:
 
 
 def _place(margin: float, bar: float) -> Place:
-    """The place of a value so far inside a band, negative outside.
+    """The place of a value by its distance inside a band (``margin``), negative outside.
 
     >>> _place(0.5, 0.2), _place(0.1, 0.2), _place(-0.3, 0.2), _place(-0.1, math.nan), _place(math.nan, 0.2)
     ('inside', 'undecided', 'outside', 'undecided', 'no answer')

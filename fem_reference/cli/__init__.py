@@ -117,7 +117,7 @@ def _check_folder(place: str, folder: Path, *, written: bool) -> None:
     if not there.is_dir():
         raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")
     if written and not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(place, f'"{folder}", where "{there}" cannot be written into', "a folder that can")
+        raise InputError(place, f'"{folder}", where "{there}" is not writable', "a folder with permission to write")
 
 
 def out(options: argparse.Namespace) -> Path:

@@ -90,6 +90,6 @@ def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
     known = bench.known("reference", choice.model_copy(update={"store_state": None}), "reference")
     if known and known.folder and not again and not states.are_kept(known.folder, known.numbers):
         took = duration(known.outcome.cost.get("seconds"))
-        got = f"a reference that was solved before without its states ({known.folder}), which stress and pressure follow from"
+        got = f"a reference that was solved before without its states ({known.folder}), from which stress and pressure follow"
         raise InputError("export", got, f"--solve, which solves it again (that took {took})")
     return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

@@ -9,7 +9,7 @@ from fem_reference.cli import DONE, write_output
 from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.studies import fetching
 
-HELP = "write the anatomy that some cases need into a folder, out of downloaded folders or archives; downloads nothing"
+HELP = "write the anatomy that some cases need into a folder, from downloaded folders or archives; downloads nothing"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     stored = [str(folder) if end == "converged" else f"{folder} ({end})" for folder, end in status.items()]
     facts: dict[str, Any] = {"cases": {scene.name: scene.title for scene in scenes}, "data": data}
     facts |= {"solvers": solvers.names(), "settings": known, "metrics": metrics.names(), "runs": stored}
-    needs = {name: f" [needs data{f': {missing}' if missing else ', which is here'}]" for name, missing in data.items()}
+    needs = {name: f" [needs data{f': {missing}' if missing else ', installed'}]" for name, missing in data.items()}
     width = max(len(scene.name) for scene in scenes)
     lines = ["cases:", *(f"  {scene.name:{width}}  {scene.title}{needs.get(scene.name, '')}" for scene in scenes)]
     lines += ["solvers, with their settings and defaults:"]

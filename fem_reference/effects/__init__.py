@@ -154,6 +154,17 @@ class VolumeLaw(Energy):
         return Moduli(bulk=self.bulk)
 
 
+class LameLaw(Energy):
+    """An isotropic energy with Lame's parameters at rest, ``mu`` and ``lame`` [MPa]."""
+
+    example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}
+    mu: PositivePressure
+    lame: PositivePressure
+
+    def moduli(self) -> Moduli:
+        return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
+
+
 class PassiveFibres(Energy):
     """An energy of fibres that resist stretch."""
 

@@ -12,7 +12,7 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class Contact(Interaction):
-    """A pressure by the gap g to each bone, which is the signed distance, negative inside: 0 beyond the ``smoothing`` d,
+    """A pressure that depends on the gap g to each bone (the signed distance, negative inside): 0 beyond the ``smoothing`` d,
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper, k the ``stiffness`` (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the

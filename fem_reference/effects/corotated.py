@@ -1,15 +1,14 @@
-"""Isotropic elastic law that is linear in the stretches, as Drake and solvers of computer graphics have it."""
+"""Isotropic elastic law that is linear in the stretches, as in Drake and in solvers of computer graphics."""
 
-from typing import Any, ClassVar
+from typing import Any
 
-from fem_reference.effects import Energy, Moduli, State
-from fem_reference.foundations.units import PositivePressure
+from fem_reference.effects import LameLaw, State
 
 # Newton steps to the sum of the stretches: they leave 4e-11 of it for stretches from 0.3 to 3, and more of it inside out.
 _STEPS = 4
 
 
-class Corotated(Energy):
+class Corotated(LameLaw):
     """``mu |F - R|^2 + lame/2 (J - 1)^2`` with R the rotation of F: the fixed corotated law (Stomakhin et al. 2012, Energetically
     consistent invertible elasticity, eq. 8).
 
@@ -17,16 +16,7 @@ class Corotated(Energy):
     greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``.
     """
 
-    example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}
-    mu: PositivePressure
-    lame: PositivePressure
-
-    def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
-        return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
-
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
         return self.mu * (state.I1 - 2 * _stretches(state) + 3) + self.lame / 2 * (state.J - 1) ** 2
 
 

@@ -1,4 +1,4 @@
-"""A source of a scalar, everywhere or in the upper half."""
+"""A source of a scalar, everywhere or in the upper half of the domain."""
 
 from typing import Any, ClassVar, Literal
 

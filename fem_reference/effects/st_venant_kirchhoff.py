@@ -1,25 +1,17 @@
 """Isotropic elastic law that is linear in Green's strain, as in MuJoCo and position based libraries."""
 
-from typing import Any, ClassVar
+from typing import Any
 
-from fem_reference.effects import Energy, Moduli, State
+from fem_reference.effects import LameLaw, State
 from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.units import PositivePressure
 
 
-class StVenantKirchhoff(Energy):
+class StVenantKirchhoff(LameLaw):
     """``mu tr(E^2) + lame/2 (tr E)^2`` with ``E = (C - 1) / 2`` (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.151).
 
     ``mu``, ``lame``: Lame's parameters [MPa]. Valid for V/V0 from 1/2 to 2: the law softens under compression, and a body that is
     pressed flat turns inside out without further resistance.
     """
-
-    example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}
-    mu: PositivePressure
-    lame: PositivePressure
-
-    def moduli(self) -> Moduli:
-        return Moduli(shear=self.mu, bulk=self.lame + 2 / 3 * self.mu)
 
     def limits(self) -> tuple[Limit, ...]:
         return (Limit("V/V0", 0.5, 2.0),)

@@ -2,7 +2,7 @@
 
 forces.csv               force, its point of application, moment and moment arm of each run by frame and bone
 runs.pvd                 the time of each frame [s], its number where the case has no time
-frames/frame_0010.vtm    reference and candidates (muscle, fibres; of the reference interior), bones, attachments
+frames/frame_0010.vtm    reference and candidates (muscle, fibres, interior of the reference), bones, attachments
 """
 
 import logging

@@ -37,7 +37,7 @@ def _checked(value: object) -> str:
     except (SyntaxError, InputError, RecursionError) as error:
         raise ValueError(_WANT) from error
     except ArithmeticError:
-        pass  # a formula all the same: it need not be finite at the point tried
+        pass  # still a formula, although it is not finite at the point tried
     return value
 
 

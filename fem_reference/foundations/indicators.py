@@ -2,7 +2,7 @@
 
 Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
 doi 10.1006/jcph.2002.7183). Here these are the displacement [mm] and the stress [MPa] that the effect causes, estimated from rest
-geometry, motion and parameters, beside the accuracy asked for. An isometric contraction displaces nothing; all of it is stress.
+geometry, motion and parameters, and compared with the wanted accuracy. An isometric contraction causes stress and no displacement.
 """
 
 from collections.abc import Mapping

@@ -36,7 +36,7 @@ def one_of(*keys: str) -> Any:
 
 
 def increasing(values: Sequence[float] | None, want: str) -> Any:
-    """The ``values``, if there are any; ValueError where each is not above the one before."""
+    """The ``values``, if there are any; ValueError unless each is above the one before."""
     if values is not None and any(late <= early for early, late in pairwise(values)):
         raise ValueError(want)
     return values

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
 # Cells of the grid along the longest edge of the region that two sets have in common.
-_CELLS = 32
+_CELLS = 16
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,8 +84,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def flattened(surface: Surface, place: Floats) -> float:
-    """The distance of a sphere from the middle of the flat triangle nearest to a ``place`` (3,) [mm] whose corners lie on it, times
-    the radius of the sphere [mm2]: the error of a flat triangle on a curved surface.
+    """The error of a flat triangle on a curved surface, times the radius of curvature [mm2], of the triangle nearest to a ``place``
+    (3,) [mm]: the distance of its middle from a sphere through its corners, times the radius of the sphere.
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6

@@ -69,9 +69,9 @@ def check(mesh: FieldMesh) -> FieldMesh:
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is not a finite number", "finite coordinates")
     if np.abs(mesh.points).max(initial=0.0) > FURTHEST:
-        raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates whose squares are numbers")
+        raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates with finite squares")
     if mesh.cells.size == 0 or mesh.cells.min() < 0 or mesh.cells.max() >= count:
-        raise InputError(mesh.place, f"a cell with a vertex outside of 1 to {count}", "vertices of its points")
+        raise InputError(mesh.place, f"a cell with a vertex outside of 1 to {count}", "numbers of its points")
     lonely = np.flatnonzero(np.bincount(mesh.cells.ravel(), minlength=count) == 0)
     if len(lonely):
         raise InputError(mesh.place, f"vertex {lonely[0] + 1} in no cell", "every vertex in a cell")

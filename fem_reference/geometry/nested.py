@@ -34,7 +34,7 @@ _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
 # then divides the error from the rim by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
 # 10.1007/s00211-005-0588-3); in a smooth part quadratic elements do better.
 GRADED = 0.25
-# A point moves towards the surface as long as the tets around it keep this share of their volume and of their quality.
+# A point moves towards the surface while the tets around it keep these shares of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
 
@@ -98,7 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, those of the boundary moved onto the surface, its volume kept; less far where tets would become invalid."""
+    """The ``points``, those of the boundary moved onto the surface at its volume, as far as the tets around them stay valid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
@@ -21,6 +20,8 @@ from fem_reference.geometry.skins import edge_lengths, quartered
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
 # Points whose winding numbers take as long as building a tree for them.
 _FEW = 20
+# A factor on a distance, for its rounding.
+_MORE = 1 + 1e-9
 # Sample points of a triangle that crosses another surface: those of a grid of quarters, its corners among them.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
 _CORNERS = _GRID.argmax(axis=0)
@@ -62,9 +63,9 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
 
     Depth in the bone is as exact as its distance field, depth in the body exact.
     """
-    local = body.moved_to(
-        apply(np.linalg.inv(pose), body.points)
-    )  # in the frame of the bone, whose boxes do not change
+    # In the frame of the bone, whose boxes do not change; beside a bone at rest those of the body do not either.
+    still = np.array_equal(pose, np.eye(4))
+    local = body if still else body.moved_to(apply(np.linalg.inv(pose), body.points))
     pairs = crossings(local, bone)
     of_body, of_bone = (np.unique(side) for side in pairs.T)
 
@@ -74,7 +75,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_body(points: Floats) -> Floats:
         return depths_within(local, points, of_body)
 
-    tips, bone_tips = _tips(body.triangles.tobytes()), _tips(bone.triangles.tobytes())
+    tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((local, of_body), (bone, of_bone)))
     first = _of_surface(local, of_body, into_bone, tips, into_bone(local.points[tips]) > 0)
     second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(local, bone.points[bone_tips]))
     count = len(local.points) + len(local.triangles)
@@ -90,9 +91,9 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
     found, some = np.zeros(len(points)), _in_box(body, points)
     if not len(some):
         return found
-    corners = np.unique(body.triangles[known]) if len(known) else np.arange(len(body.points))
-    reach = cKDTree(body.points[corners]).query(points[some])[0]
-    near = reached(around(points[some], reach), boxes_of(body))
+    triangles = body.triangles[known] if len(known) else body.triangles
+    squares = igl.point_mesh_squared_distance(points[some], body.points, triangles)[0]
+    near = reached(around(points[some], _MORE * np.sqrt(squares)), boxes_of(body))
     triangles = body.triangles[near][triangle_areas(body.points, body.triangles[near]) > 0]
     if len(triangles):
         vertices, numbers = np.unique(triangles, return_inverse=True)
@@ -121,7 +122,8 @@ def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
     """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of the deepest sample of triangles
-    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``.
+    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``;
+    ``tips`` are of parts without such triangles.
     """
     points, corners = surface.points, surface.triangles[crossing]
     grid = np.einsum("gc,tci->tgi", _GRID, points[corners])
@@ -154,14 +156,23 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
         deep[grown] = True
 
 
+def _tips(surface: Surface, crossing: Ints) -> Ints:
+    """A vertex of each part of a surface that has no triangle ``crossing`` another surface; its side is that of the part."""
+    firsts, parts = _parts_of(surface)
+    return np.delete(firsts, parts[surface.triangles[crossing, 0]])
+
+
 @lru_cache(maxsize=16)
-def _tips(triangles: bytes) -> Ints:
-    """A vertex of each part of a surface of ``triangles``, 64 bit integers, which shows the side of a part without a crossing."""
+def _parts_of(surface: Surface) -> tuple[Ints, Ints]:
+    return _parts(surface.triangles.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _parts(triangles: bytes) -> tuple[Ints, Ints]:
+    """The first vertex of each part of a surface of ``triangles``, 64 bit integers, and the number (n,) of the part of each."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
     parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
-    found = np.zeros(parts.max() + 1, np.int64)
-    found[parts[::-1]] = np.arange(len(parts))[::-1]  # reversed, so that the first of each is set last
-    return np.sort(found)
+    return np.unique(parts, return_index=True)[1], parts
 
 
 class Shared(NamedTuple):

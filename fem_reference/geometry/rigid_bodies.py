@@ -32,24 +32,19 @@ class Obstacle(Protocol):
     @property
     def steepest(self) -> float:
         """A bound of the length of the gradient."""
-        ...
 
     @property
     def half_thickness(self) -> float:
         """The depth [mm] of its deepest place."""
-        ...
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
         """A lower bound (n,) [mm] of the path from points (n, 3) to where the distance is at most ``within`` [mm]."""
-        ...
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
-        ...
 
     def distances(self, points: Floats) -> Floats:
         """The distance (n,) [mm] of :meth:`sample` alone."""
-        ...
 
 
 class Exact:

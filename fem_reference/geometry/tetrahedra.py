@@ -102,7 +102,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
-    log.warning("%s: fTetWild meshes it, differently each time, for gmsh cannot: %s", surface.place, reason)
+    log.warning("%s: meshed by fTetWild, differently each time, as gmsh cannot: %s", surface.place, reason)
     return checked(run("tetwild", surface, size), surface)
 
 

@@ -42,7 +42,7 @@ _RELAXED = 5.0
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """Statistics over the fibres of ``L - L_reference``: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
 
-    And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
+    ``mean_percent``, ``rms_percent`` and ``max_percent`` are the same in per cent of each fibre's length at rest.
     """
     found, expected = both_lengths(run, reference, context)
     longer, at_rest = found - expected, lengths_at(context.fibres.points, run.numbers[0], context)

@@ -15,7 +15,7 @@ STATISTICS = {
         "In muscles",
         "deepest",
         headline="{} deep in another muscle",
-        curve="Depth of the muscle inside another one, or of that inside it",
+        curve="Depth to which the muscle and another one penetrate each other",
         shown={"curve": 52, "headline": 60},
     ),
 }

@@ -25,7 +25,7 @@ STATISTICS = {
         "mm",
         "In bones",
         "deepest",
-        curve="Depth of the muscle inside a bone, beside attachments beyond that at rest",
+        curve="Depth of the muscle inside a bone, near attachments beyond that at rest",
         shown={"table": 80, "curve": 50, "solvers": 70, "scenes": 40},
     ),
     "volume": Statistic("mm3", curve="Volume inside bones, without attached parts", shown={"curve": 60}),

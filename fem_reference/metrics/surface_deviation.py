@@ -75,14 +75,14 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; where nothing travels 0 stays 0, the rest is infinite."""
+    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, 0 where a value is 0, else infinite."""
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)
 
 
 def _worst(deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """The vertex with the greatest deviation in each frame, and where the reference has it."""
+    """The vertex with the greatest deviation in each frame, and its place in the reference."""
     vertices = np.argmax(deviations, axis=1) % len(reference.surface.points)
     return tuple(
         f"vertex {vertex} at {place_of(at)}"

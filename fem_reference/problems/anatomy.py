@@ -26,7 +26,7 @@ from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, near its corners, near the middles of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
-# The most triangles of a draped patch: those of a patch of some metres.
+# The most triangles of a draped patch: enough for a patch of some metres.
 _MOST_TRIANGLES = 2**20
 # The longest side [mm] of the triangles of a draped patch.
 _SIDE = 2.0
@@ -240,7 +240,7 @@ def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
 
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
-    it. It is the shear by their tension. Those traced from one attachment to the other, or mapped, are taken to follow it.
+    it, which scales the shear by their tension. Traced and mapped fibres follow the axis, except for pennation and rotation.
     """
     turning = _turning(case)
     if (lines := _given(case)) is None:

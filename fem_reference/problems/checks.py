@@ -216,7 +216,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
 
 
 def _check_needs(body: Body) -> None:
-    """Raise InputError where an effect needs fibre directions or times that a body lacks, or directions are no unit vectors."""
+    """Raise InputError where an effect needs fibre directions or times that a body lacks, or directions are not unit vectors."""
     needs = {need for effect in body.effects for need in effect.needs}
     if body.interval is None and "interval" in needs:
         raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")

@@ -1,7 +1,7 @@
 """Contact with bones: the bones around a body, and the law of the contact pressure."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,25 +113,18 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
-        want = f"less: its middle is {half:.3g} mm deep, and from there no side is nearer"
+        want = f"less: its middle is {half:.3g} mm deep, where no side is nearer than another"
         raise InputError(f'bone "{name}"', got, want)
     return nearest
 
 
-def check_outside(bones: Mapping[str, Surface], muscle: Surface) -> None:
-    """Raise InputError where a bone, by its place in a scene, is wholly inside the muscle: no force moves it out."""
-    for place, bone in bones.items():
-        if signed_distances(bone.points, muscle).max() < 0:
-            raise InputError(place, "a bone wholly inside the muscle", "one that is not")
-
-
-def check_thickness(bones: Mapping[str, Obstacle], apart: float) -> None:
-    """Raise InputError where a bone, by its place in a scene, is too thin for contact points ``apart`` [mm]."""
-    for place, bone in bones.items():
-        if not bone.half_thickness >= _THINNEST * apart:
-            got = f"a bone {2 * bone.half_thickness:.2g} mm thick"
-            want = f"{2 * _THINNEST * apart:.2g} mm or more, as points of contact are {apart:.2g} mm apart"
-            raise InputError(place, got, want)
+def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
+    """InputError where a bone is inside the muscle, as no force moves it out, or too thin for contact points ``apart`` [mm]."""
+    if signed_distances(surface.points, muscle).max() < 0:
+        raise InputError(place, "a bone wholly inside the muscle", "one that is not")
+    if not shape.half_thickness >= _THINNEST * apart:
+        want = f"{2 * _THINNEST * apart:.2g} mm or more, as points of contact are {apart:.2g} mm apart"
+        raise InputError(place, f"a bone {2 * shape.half_thickness:.2g} mm thick", want)
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:

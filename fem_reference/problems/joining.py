@@ -22,6 +22,17 @@ from fem_reference.problems.touching import Touching
 Range = tuple[int, int]
 
 
+@dataclass(frozen=True)
+class Span:
+    """The slices of joined arrays for one muscle: vertices of the surface, points of fibres, points of the mesh, and cells."""
+
+    name: str
+    vertices: slice
+    fibres: slice
+    points: slice
+    cells: slice
+
+
 def called(piece: str, name: str) -> str:
     """The name in the joined body of a part of a ``piece`` with a ``name`` there."""
     return f"{piece} {name}"

@@ -48,9 +48,8 @@ from fem_reference.problems.checks import check_agreement, check_thinness
 from fem_reference.problems.contact import (
     ContactBone,
     ContactLaw,
+    check_bone,
     check_exempt,
-    check_outside,
-    check_thickness,
     nearest_at_rest,
 )
 from fem_reference.problems.fibre_ends import attached_ends, completed, facts_of
@@ -197,9 +196,10 @@ def assembled(
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
     """Spacing and errors [mm] of bones' distance grids; InputError where bones and surface do not allow contact."""
-    pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
-    check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
-    check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
+    for i, bone in enumerate(rest.bones):
+        if contact.is_by(bone.name):
+            place = join(case.place, f"bone[{i}]")
+            check_bone(place, bone.surface, bone.shape, rest.surface, spacing(rest.surface))
     check_exempt(rest.exempt, join(case.place, "attachment"))
     return {
         f"{bone.name}_distance_{key}_mm": getattr(bone.shape, key)
@@ -244,9 +244,9 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
         place = join(case.place, f"attachment[{i}]")
         vertices = pick(case, i, surface, by_name[attachment.bone].surface)
         if len(vertices) == 0:
-            raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
+            raise InputError(place, "no vertex of the muscle", "an attachment that selects vertices")
         if taken[vertices].any():
-            got = f"vertex {vertices[taken[vertices]][0]}, which another attachment has"
+            got = f"vertex {vertices[taken[vertices]][0]}, which belongs to another attachment"
             raise InputError(place, got, "each vertex once")
         taken[vertices] = True
         bone, tendon = by_name[attachment.bone], tendon_of(case, i)

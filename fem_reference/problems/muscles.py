@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fem_reference.effects import Effect
 from fem_reference.effects import contact as contacts
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
@@ -24,7 +26,7 @@ from fem_reference.problems import muscle
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decision, decisions, estimates
 from fem_reference.problems.guess import length_of, thickness_of
-from fem_reference.problems.joining import called, join
+from fem_reference.problems.joining import Span, called, join
 from fem_reference.problems.muscle import RELAXING, MuscleProblem
 from fem_reference.problems.problem import AtRest, Task
 from fem_reference.problems.setup import Bone, Setup
@@ -33,17 +35,6 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.muscles import MusclesCase
 
 _BETWEEN = 8  # samples of the motion of a bone between two stops
-
-
-@dataclass(frozen=True)
-class Span:
-    """The slices of joined arrays for one muscle: vertices of the surface, points of fibres, points of the mesh, and cells."""
-
-    name: str
-    vertices: slice
-    fibres: slice
-    points: slice
-    cells: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +86,22 @@ class MusclesProblem:
         return next(iter(self.problems.values())).frames
 
     @property
+    def bones(self) -> tuple[Bone, ...]:
+        """The bones, which all muscles share."""
+        return next(iter(self.problems.values())).bones
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of all muscles, and the contact between them."""
+        found = tuple(effect for one in self.problems.values() for effect in one.effects)
+        return found if self.law is None else (*found, self.law)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the vertices of all surfaces that may be in contact with bones."""
+        return np.concatenate([one.free for one in self.problems.values()])
+
+    @property
     def seconds(self) -> float:
         """The time of meshing."""
         return sum(one.seconds for one in self.problems.values())
@@ -108,16 +115,13 @@ class MusclesProblem:
     def rest(self) -> AtRest:
         """All shapes that its frames move, those of one muscle after those of another."""
         found = list(self.problems.values())
-        starts, lines = [0], list[Floats]()
-        for one in found:
-            starts += (starts[-1] + one.fibres.offsets[1:]).tolist()
-            lines.append(one.fibres.points)
+        counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]
         along = None
         if any(one is not None for one in known):
             blank = [np.tile([1.0, 0.0, 0.0], (len(one.mesh.tets), 1)) for one in found]
             along = np.concatenate([no if one is None else one for one, no in zip(known, blank, strict=True)])
-        fibres = Polylines(np.concatenate(lines), np.array(starts))
+        fibres = Polylines(np.concatenate([one.fibres.points for one in found]), np.cumsum([0, *counts]))
         return AtRest(_surfaces([one.surface for one in found]), fibres, _meshes([one.mesh for one in found]), along)
 
     @property

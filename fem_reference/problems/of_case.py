@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +28,20 @@ log = logging.getLogger(__name__)
 
 # A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
 CaseSetup = Setup | MusclesSetup | FieldProblem
-CaseProblem = MuscleProblem | MusclesProblem | FieldProblem
+MechanicalProblem = MuscleProblem | MusclesProblem
+CaseProblem = MechanicalProblem | FieldProblem
+
+
+def mechanical(built: CaseProblem) -> MechanicalProblem | None:
+    """The problem, if it is of one muscle or several; None for a field."""
+    return None if isinstance(built, FieldProblem) else built
+
+
+def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalProblem:
+    """The problem with other ``frames``."""
+    if isinstance(built, MuscleProblem):
+        return replace(built, frames=frames)
+    return replace(built, problems={name: replace(one, frames=frames) for name, one in built.problems.items()})
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:

@@ -173,7 +173,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
             if len(np.unique(vertices)) < len(vertices):
                 raise InputError(path, "a vertex named twice", "one value for each vertex")
             if (np.abs(values[vertices] - table[1]) > 0).any():
-                raise InputError(path, "other values than another file of bounds has", "one value for each vertex")
+                raise InputError(path, "values unlike those of another file of bounds", "one value for each vertex")
             values[vertices] = table[1]
     return values
 
@@ -205,7 +205,7 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
                 raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
             sloped = np.concatenate([sloped, keys])
         if len(facets) == 0:
-            raise InputError(f"{place}.on", f'"{entry.on}", where there is nothing', "an end or a rim of the domain")
+            raise InputError(f"{place}.on", f'"{entry.on}", which has no facets', "an end or a rim of the domain")
         key = "slope" if entry.value is None else "value"
         _try(str(getattr(entry, key)), mesh.points[np.unique(facets)], f"{place}.{key}")
         if entry.value is not None:

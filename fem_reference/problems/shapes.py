@@ -28,7 +28,7 @@ _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# The growth of the angle at the apex, above its mean, by which the arc length grows evenly.
+# The relative excess of the slope of the angle at the apex over its mean, with which the arc length grows evenly.
 _APEX = 0.3
 
 

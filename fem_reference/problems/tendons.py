@@ -42,12 +42,12 @@ def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> P
     number = [one.attachment for one in rest.attached].index(effect.on)
     entry, place = rest.attached[number], f"effect {effect.title}"
     if entry.tendon is None:
-        raise InputError(place, f'the attachment "{effect.on}" without a tendon', "landmarks that it goes to")
+        raise InputError(place, f'the attachment "{effect.on}" without a tendon', "landmarks at its end")
     ends = attached_ends(rest.attached, rest.exempt, fibres)
     assert ends is not None  # of an attachment
     beyond = (ends.by == number) & np.isfinite(ends.tendons[:, :, 0])
     if not beyond.any():
-        raise InputError(place, "no fibre that continues as it", "fibres that end beside the attachment")
+        raise InputError(place, "no fibre that continues as this tendon", "fibres that end beside the attachment")
     away, _ = cKDTree(ends_of(fibres)[beyond]).query(rest.surface.points)
     shares = attached_shares(rest.surface, np.setdiff1d(np.flatnonzero(away <= effect.reach), rest.attached_vertices))
     skin = attached_skin(rest.surface, shares, mesh, spacing(rest.surface))

@@ -1,4 +1,4 @@
-"""Pages that contain everything themselves, and the same numbers as JSON and CSV: nothing is computed here.
+"""Self-contained pages, and the same numbers as JSON and CSV; no number is computed here.
 
 Each kind of page is one module, whose ``page`` makes the record that :func:`write` writes.
 """

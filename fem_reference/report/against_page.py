@@ -26,7 +26,7 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case of that ``setup``."""
     current = versions.current
-    # Of the frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing.
+    # Pictures of the frame with the greatest change: before, now, and the change, in one colour scale; or the missing software.
     run, found = current.candidate, versions.place
     known = [one for one in versions.changes if one.word != "no number"]  # those that changed most first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
@@ -45,7 +45,7 @@ def page(versions: Versions, setup: Setup) -> Page:
         "seconds": seconds_per_frame(current.candidate),
         "label": partial(label, current.scene, setup),
     }
-    title = f"{current.candidate.name} against what it was: {current.scene.title}"
+    title = f"{current.candidate.name} against its earlier version: {current.scene.title}"
     said = (("", word(versions), headline(versions)),)
     return Page("two versions", title, said, "against_page.html", contents, facts(versions))
 
@@ -71,7 +71,7 @@ def sentence(one: Change) -> str:
 
 
 def _by(one: Change, k: int) -> str:
-    """The change of a statistic in the k-th frame, nearer or further away."""
+    """The change of a statistic in the k-th frame, nearer to the reference or further away."""
     by = float(one.further[k])
     return f"{number(abs(by))} {_unit(one)} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
 
@@ -125,7 +125,7 @@ def _curve(one: Change, i: int) -> Drawing:
 
 
 def _moved(versions: Versions) -> Drawing | None:
-    """The distance of vertices from where they were; None where none moved."""
+    """The distance of vertices from their earlier positions; None where none moved."""
     if versions.place is None:
         return None
 
@@ -136,11 +136,11 @@ def _moved(versions: Versions) -> Drawing | None:
             axes.plot(frames, [value(row) if len(row) else np.nan for row in rows], style, color=PALETTE[0], label=name)
         axes.set_ylim(bottom=0)
 
-    return over_frames("moved", "Distance of vertices from where they were", "mm", draw)
+    return over_frames("moved", "Distance of vertices from their earlier positions", "mm", draw)
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:
-    """The i-th frame as it moved, before and now; without those that are not a number somewhere."""
+    """The i-th frame with its change, before and now; without those that are not a number somewhere."""
     current = versions.current
     points, frame, truth = current.points[i], current.candidate.numbers[i], current.reference.positions[i]
     before = versions.before
@@ -156,7 +156,7 @@ def _shots(versions: Versions, i: int) -> list[Shot]:
 
 
 def _everywhere(versions: Versions, i: int) -> Floats:
-    """The distance of every vertex (n,) [mm] from where it was; of sampled ones, that of the nearest of them."""
+    """The distance of every vertex (n,) [mm] from its earlier position; if only some are known, that of the nearest one."""
     if versions.before is not None:
         return np.asarray(versions.moved[i])
     rest = versions.current.rest

@@ -1,4 +1,4 @@
-"""Pages requested by a command: their names, which state what makes each different, and the index of all pages in a folder."""
+"""Pages requested by a command: their names, which state how each differs, and the index of all pages in a folder."""
 
 import hashlib
 import logging
@@ -16,13 +16,13 @@ log = logging.getLogger(__name__)
 
 LONGEST = 100  # characters of the name of a page
 INDEX = "index"  # the name of its page, and its kind
-# Files below a folder here that are no pages of ours and yet may be looked for.
+# Names under which other HTML files in subfolders are listed too.
 _OTHERS = ("report.html", "index.html")
 
 
 @dataclass(frozen=True)
 class Part:
-    """Words of a command line that determine what it computes, and what they add to the default name of its page."""
+    """The ``words`` of a command line that determine its result, and the ``name`` that they add to the default name of its page."""
 
     words: tuple[str, ...]
     name: str = ""
@@ -30,8 +30,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page as a command requests it: the ``verb``, the ``base`` of its default name, what determines it, and the name in its
-    folder, empty where it has no folder of its own.
+    """A page as a command requests it: the ``verb``, the ``base`` of its default name, the ``parts`` that determine it, and its
+    name ``page`` in its own folder, empty without such a folder.
     """
 
     verb: str
@@ -53,7 +53,7 @@ class Asked:
 
 
 def _plain(text: str) -> str:
-    """A text as it may stand in the name of a file.
+    """A text without characters that a file name cannot have.
 
     >>> _plain("muscle.tet_size=8 mm"), _plain("effect[0].mu=1 kPa")
     ('muscle.tet_size=8mm', 'effect0.mu=1kPa')
@@ -62,7 +62,7 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page, as ``name`` where that is given, and the index, where nothing else is lost; its path and what is printed."""
+    """Write a page, under ``name`` if given, and the index, unless that would overwrite another file; its path and messages."""
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
@@ -73,14 +73,14 @@ def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> 
     notes = [note] if note else []
     try:
         write_index(folder)
-    except OSError as error:  # the page is there, and worth more than its index
+    except OSError as error:  # the page is written, and matters more than its index
         notes.append(f"no index: {error}")
     return path, [f"page: {path}", *(f"  {line}" for line in notes)]
 
 
 @dataclass(frozen=True)
 class IndexEntry:
-    """A page: its ``name`` here, its address from here, when it was ``made``, and its ``head``."""
+    """A page: its ``name`` in the index, its relative address, the time when it was ``made``, and its ``head``."""
 
     name: str
     address: str
@@ -93,7 +93,7 @@ def write_index(folder: Path) -> None:
     path = folder / f"{INDEX}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != INDEX):
-        log.info("no index: %s is no index of fem_reference, and stays as it is", path)
+        log.info("no index: %s is no index of fem_reference, and is kept", path)
         return
     pages.write(index(*entries_of(folder)), folder, INDEX)
 
@@ -119,7 +119,7 @@ def entries_of(folder: Path) -> tuple[list[IndexEntry], list[str]]:
 
 
 def _changed(path: Path) -> str:
-    """The time when a file was changed last; empty where it was removed since it was listed."""
+    """The time of a file's last change; empty if it was removed in the meantime."""
     try:
         seconds = path.stat().st_mtime
     except OSError:

@@ -1,4 +1,4 @@
-"""Frames in words: a frame number of the case, with the time and the bones' angles there, where these are known."""
+"""Frames in words: a frame number of the case, with the time and the bones' angles, where these are known."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -22,7 +22,7 @@ class Column:
 
 
 def columns(case: Case, setup: Any) -> list[Column]:
-    """Time [s], where the case has any, and the motions of its bones."""
+    """Time [s], if the case has an interval, and the motions of its bones."""
     interval = getattr(getattr(case, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
     return found + motions(getattr(setup, "bones", ()))

@@ -1,19 +1,20 @@
-"""A calibration as lines of text: the estimates with their intervals, and what the measurements do not determine."""
+"""A calibration as lines of text: the estimates with their intervals, and parameters that the measurements do not determine."""
 
 from fem_reference.assessment.calibration import CONFIDENCE, FOLLOWED, Calibration, Estimate
-from fem_reference.assessment.uncertainty import Failure
 from fem_reference.report.words import number
 
-# Scatter below this, in standard deviations of the data, is remarked.
+# A scatter below this, in standard deviations of the data, is remarked on.
 _LITTLE = 0.5
 
 
 def text(found: Calibration) -> str:
     """A calibration as lines of text."""
     lines = [
-        f"{found.case}: {len(found.estimates)} parameters from {len(found.rows)} measurements, {found.runs} runs asked"
+        f"{found.case}: {len(found.estimates)} parameters from {len(found.rows)} measurements, {found.runs} runs requested"
     ]
-    lines += [f"  no answer: {one.status}: {one.message} ({_values(one)})" for one in found.failures]
+    for one in found.failures:
+        values = ", ".join(f"{key} = {value:g}" for key, value in one.values.items())
+        lines.append(f"  no answer: {one.status}: {one.message} ({values})")
     if found.ended:
         lines.append(f"  no fit: {found.ended}{'; the best point so far:' if found.estimates else ''}")
         best = [f"  {one.parameter.title}: {one.value:.5g} {one.parameter.unit}".rstrip() for one in found.estimates]
@@ -22,7 +23,7 @@ def text(found: Calibration) -> str:
         lines.append("  not converged: a step could still lead nearer to the measurements")
     lines += [_line(one) for one in found.estimates]
     lines.append(
-        f"  what is left scatters by {number(found.scatter)} of the standard deviations of the data{_remark(found.scatter)}"
+        f"  residuals scatter by {number(found.scatter)} of the standard deviations of the data{_remark(found.scatter)}"
     )
     lines += [
         f"  not determined apart: {one} and {other}, whose errors are correlated by {correlation:.3f}"
@@ -32,19 +33,17 @@ def text(found: Calibration) -> str:
     return "\n".join([*lines, f"  singular values of the sensitivities: {values}"])
 
 
-def _values(one: Failure) -> str:
-    return ", ".join(f"{key} = {value:g}" for key, value in one.values.items())
-
-
 def _line(one: Estimate) -> str:
-    """An estimate with its interval, or why it has none to speak of."""
+    """An estimate with its interval, and a remark if they are not determined."""
     unit = f" {one.parameter.unit}" if one.parameter.unit else ""
     said = (
         f"  {one.parameter.title}: {one.value:.5g}{unit}, {100 * CONFIDENCE:.0f} % from {one.low:.5g} to {one.high:.5g}"
     )
     if one.at:
         end = getattr(one.parameter, one.at)
-        return f"{said}: at the {one.at} end of its range, {end:.5g}{unit}, so that neither it nor its interval counts"
+        return (
+            f"{said}: at the {one.at} end of its range, {end:.5g}{unit}, so neither it nor its interval is meaningful"
+        )
     return said if one.is_known else f"{said}: not determined by these measurements"
 
 
@@ -52,4 +51,4 @@ def _remark(scatter: float) -> str:
     """The meaning of a scatter that is far from 1."""
     if scatter > FOLLOWED:
         return ": the law does not fit the data"
-    return ": the data scatter less than they say" if scatter < _LITTLE else ""
+    return ": the data scatter less than their standard deviations" if scatter < _LITTLE else ""

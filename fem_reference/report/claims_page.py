@@ -18,7 +18,7 @@ UNITS = {metric: one.unit for (metric, _), one in described("claim").items()}
 
 
 def page(claims: Claims) -> Page:
-    """The page of error bars beside errors."""
+    """The page of error bars and true differences."""
     whole = Cover.of(claims.claims)
     contents = {
         "claims": claims,
@@ -46,14 +46,14 @@ def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
 
 
 def facts(claims: Claims) -> dict[str, Any]:
-    """All of it as valid JSON: a number that is not finite is None."""
+    """The contents of the page as valid JSON: a number that is not finite is None."""
     whole = Cover.of(claims.claims)
     said = {"claims": whole.count, "covered": whole.share, "median_ratio": whole.median}
     return dict(plain(said | {"sizes_mm": claims.sizes, "missing": claims.missing, "rows": claims.claims}))
 
 
 def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
-    """Bars against errors, a colour for each case; ``name`` makes its ids those of this drawing alone."""
+    """Bars against errors, a colour for each case; ``name`` makes the ids in the drawing unique."""
     title = f"{words(metric).capitalize()}: claimed against true"
 
     def draw(_: Figure, axes: Axes) -> None:

@@ -28,7 +28,7 @@ from fem_reference.runs.store import Run, seconds_per_frame
 
 
 def page(comparison: Comparison) -> Page:
-    """The page of a comparison; of a reference that failed, over the frames that it reached."""
+    """The page of a comparison; if the reference failed, over the frames that it reached."""
     numbers, failed = summary(comparison), _failed(comparison)
     nothing, comparison = not len(reached_frames(comparison.reference)), reached(comparison)
     said, rows = headlines(comparison), as_csv(numbers["measures"])
@@ -38,18 +38,18 @@ def page(comparison: Comparison) -> Page:
 
 
 def _failed(comparison: Comparison) -> str:
-    """The reason why the reference did not reach all frames, and what the page shows then; empty where it did."""
+    """The reason why the reference did not reach all frames, and the scope of the page then; empty where it did."""
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
     kept = reached_frames(reference)
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
-        return f"{why} No frame was reached, so that nothing could be measured against it."
+        return f"{why} No frame was reached, so nothing could be measured against it."
     if reference.outcome.status == "denied":
-        return f"{why} What follows is measured against no truth."
+        return f"{why} The measures below are not against a valid truth."
     last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
-    return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
+    return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}; the page covers these."
 
 
 def _contents(comparison: Comparison) -> dict[str, Any]:
@@ -85,8 +85,8 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
 
 
 def widest(bar: ErrorBar, measure: Measure | None) -> int:
-    """The index of the widest of a ``bar`` among the frames in which the reference's ``measure`` has a value, such as a moment arm
-    where there is a force; an unknown bar there counts as the greatest.
+    """The index of the widest ``bar`` among the frames in which the reference's ``measure`` has a value (a moment arm has one only
+    where there is a force); an unknown bar there counts as the widest.
     """
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest
@@ -112,11 +112,11 @@ def headlines(comparison: Comparison) -> Headlines:
 def _checks(comparison: Comparison) -> str:
     """The number of expectations of the reference that are met, in words."""
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
-    return f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
+    return f"{words.count('pass')} of {len(words)} of its own checks met" if words else "no checks of its own"
 
 
 class VerdictRow(NamedTuple):
-    """A row of the table at the top: a ``run`` with its verdict, its headline measures, None where it has none, and remarks."""
+    """A row of the top table: a ``run``, its verdict, its headline measures, None where it lacks one, and remarks."""
 
     run: Run
     word: str
@@ -125,7 +125,7 @@ class VerdictRow(NamedTuple):
 
 
 def first_rows(comparison: Comparison) -> list[VerdictRow]:
-    """The rows of the table at the top, the reference last; its doubts are stated beside its verdict."""
+    """The rows of the top table, the reference last, with its doubts beside its verdict."""
     rows = list[VerdictRow]()
     for run in comparison.candidates:
         found = comparison.deviations.get(run.name, ())
@@ -140,13 +140,13 @@ def first_rows(comparison: Comparison) -> list[VerdictRow]:
 
 
 def _headline_keys(comparison: Comparison) -> list[tuple[str, str]]:
-    """The metric and statistic of each column of that table: those that a candidate has."""
+    """The metric and statistic of each column of the top table: those that some candidate has."""
     every = [one for run in comparison.candidates for one in comparison.deviations.get(run.name, ())]
     return [key for key in described("headline") if find(every, *key) is not None]
 
 
 def first_columns(comparison: Comparison) -> list[str]:
-    """The heads of its columns of numbers."""
+    """The headings of the top table's columns of numbers."""
     named = described("headline")
     return [f"{named[key].title}, {named[key].part}".strip(", ") for key in _headline_keys(comparison)]
 
@@ -165,15 +165,15 @@ def _greatest(comparison: Comparison, run: Run) -> str:
         bar = "" if at.error_bar is None else f" ± {number(at.error_bar)}"
         value = f"{number(at.value)}{bar} {one.unit}".strip()
         said.append(described_as.headline.format(value) + lost)
-    return "; ".join(said) or "nothing of it can be measured"
+    return "; ".join(said) or "nothing could be measured"
 
 
 def _sentence(comparison: Comparison) -> str:
-    """The comparison in a sentence: who was compared, over which frames, and the number of expectations that are met."""
+    """The comparison in a sentence: the candidates, the frames, and the number of expectations that are met."""
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
     compared = f"{listed(names)} compared with the reference" if names else "The reference"
     words = [verdict.word for verdict in comparison.verdicts]
-    met = f"{words.count('pass')} of {len(words)} expectations met" if words else "nothing is expected"
+    met = f"{words.count('pass')} of {len(words)} expectations met" if words else "no expectations"
     alone = "" if names else ", without a candidate"
     solver = comparison.reference.solver
     return f"{compared} computed by {solver}, over {len(numbers)} frames ({numbers[0]} to {numbers[-1]}){alone}: {met}."

@@ -1,4 +1,4 @@
-"""The page ``credibility``: by quantity, what it is verified and validated by, after NIST's fire models and ASME V&V 40."""
+"""The page ``credibility``: the verification and validation of each quantity, after NIST's fire models and ASME V&V 40."""
 
 import math
 from collections import Counter
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.credibility import Beside, Credibility, Row, count, of_arms, reached
-from fem_reference.assessment.experiments import Experiment, experiments
+from fem_reference.assessment.experiments import experiments
 from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
@@ -33,7 +33,7 @@ def page(found: Credibility) -> Page:
         "met": {
             (fit.law, one.name): met(fit.values, one) for fit in found.fits for row in found.rows for one in row.beside
         },
-        "records": _records(found),
+        "records": dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {},
         "differences": {row.claim.name: differences(row, found.arms) for row in found.rows},
         "specimens": {row.claim.name: specimens(row) for row in found.rows},
         "source": source,
@@ -49,23 +49,23 @@ def by_grade(found: Credibility) -> list[tuple[str, list[str], str]]:
 
 
 def said(found: Credibility) -> str:
-    """The number of quantities by grade, and of comparisons that are met, with measurements and with other models."""
+    """The number of quantities by grade, and the number of measurements and other models that agree."""
     counts = Counter(str(row.grade) for row in found.rows)
     grades = ", ".join(f"{counts[grade]} {grade}" for grade in GRADES if counts[grade])
     beside = [one for row in found.rows for one in row.beside]
     (met_by, measured), (near, models) = count(beside, "measurement"), count(beside, "model")
     within = f"{met_by} of {measured} measurements within their uncertainty"
-    return f"{len(found.rows)} quantities: {grades}; {within}, {near} of {models} other models as near as asked for"
+    return f"{len(found.rows)} quantities: {grades}; {within}, {near} of {models} other models within the tolerance"
 
 
 def met(values: Mapping[str, float], one: Beside) -> bool | None:
-    """True where the value by the name of a comparison is within its uncertainty; None where there is none."""
+    """True where the value for a comparison is within its uncertainty; None without a value."""
     return abs(values[one.name] - one.truth) <= one.within if one.name in values else None
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """The count of measured numbers that the model misses to either side, and its distances: of moment arms in mm, on the mean over
-    the poses of each case, else in uncertainties of the measurement; orders apart.
+    """The number of measured values that the model misses on either side, and the distances: for moment arms in mm, the mean over
+    the poses of each case, else in uncertainties of the measurement. Wrong orders are counted separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
@@ -102,11 +102,6 @@ def source(experiment: str) -> str:
     'Van Loocke 2006'
     """
     return experiment.replace("_", " ").title()
-
-
-def _records(found: Credibility) -> dict[str, Experiment]:
-    """The records of all experiments, those first of which a comparison bears the name."""
-    return dict(sorted(experiments().items(), key=lambda item: item[0] == "scale")) if found.rows else {}
 
 
 def facts(found: Credibility) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
 _KNOWN = "error bar"
-_FAR = 50.0  # of two candidates' greatest distances, beyond which they share a logarithmic axis
+_FAR = 50.0  # ratio of two candidates' greatest distances beyond which the common axis is logarithmic
 _RANGE = "least and greatest fibre"
 _STATISTICS = (
     ("max", "worst vertex", "-"),
@@ -46,20 +46,20 @@ def curves(comparison: Comparison) -> list[Drawing]:
 
 
 def label_of(inverted: Measure) -> str:
-    """The place of the smallest det F in words, which distinguishes an inversion measure from the others."""
+    """The words that distinguish one inversion measure from the others: the places at which det F is smallest."""
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
 def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
-    """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of the joint of index
-    ``i``, where it turns alone. None where nothing is known there.
+    """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of joint ``i`` at the
+    frames where it rotates alone. None where nothing is known there.
     """
     context, numbers = comparison.context, comparison.reference.numbers
     measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
     found = {run: measure for run, measure in measures.items() if measure is not None}
     name, over, along, shown = "-".join(key), "frame", np.asarray(numbers, float), np.ones(len(numbers), bool)
     if i is not None:
-        assert isinstance(context, MeasurementContext)  # which has the joints
+        assert isinstance(context, MeasurementContext)  # the kind with joints
         joint, shown = context.joints[i], turning(context.joints, context, numbers) == i
         name, over, along = f"{name}-{i}", f"angle of {joint.name} [°]", np.degrees(joint.angles(numbers))
         title = f"{title}, over the angle"
@@ -71,7 +71,7 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
 def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
-    """The measures ``found`` by run over ``along`` (f,), at the frames ``shown`` (f,), and the range of the reference's fibres."""
+    """Draw the measures ``found``, by run, over ``along`` (f,), at the frames ``shown`` (f,), and the range of reference fibres."""
     look_by_name = looks(run.name for run in comparison.runs)
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
@@ -88,7 +88,7 @@ def _draw_runs(
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
-    """The ends of the axis [mm] that the surfaces of all candidates share, and whether it is logarithmic: if they differ much."""
+    """The ends of the common axis [mm] of the surfaces of all candidates; True if it is logarithmic, as they differ much."""
     wanted = [("surface_deviation", statistic) for statistic, _, _ in _STATISTICS]
     tops = []
     for measures in comparison.deviations.values():

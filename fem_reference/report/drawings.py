@@ -19,13 +19,13 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
-# resemble none of these; then what is left between them. style.css has them on dark paper.
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then Tol's muted colours that resemble none
+# of these; then colours between them. style.css has their variants for dark pages.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
     *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
 )
-# Runs that have their own colour of the palette on all pages, in its order. A name that is not here is no mistake.
+# Runs with a fixed colour on all pages, in the order of the palette. Other names take the next colours.
 _OURS = (
     *(
         "pbd",
@@ -40,10 +40,10 @@ _OURS = (
     ),
     *("xpbd", "arap", "pbd_program", "arap_volume_step", "line_of_action"),
 )
-# Lines of so many runs are told apart by colour alone; the next ones are broken.
+# This many lines differ by colour alone; further ones are dashed.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
-BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
+BAND = "#01010120"  # nearly black, as matplotlib omits pure black from SVG
 LOOK: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "fem_reference",
@@ -59,7 +59,7 @@ LOOK: Any = {
     "ytick.color": "#444444",
     "legend.frameon": False,
 }
-# Colours that a page in dark colours draws otherwise, by the names that style.css gives them.
+# Names in style.css of colours that change on dark pages.
 _NAMED = {
     "#e8e8e8": "grid",
     "#888888": "axis",
@@ -85,7 +85,7 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The i-th colour, that of the reference first: the palette, then its colours ever darker.
+    """The i-th colour, that of the reference first, then the palette, then its colours in ever darker shades.
 
     >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
@@ -107,7 +107,7 @@ def look_of(i: int) -> dict[str, Any]:
 
 
 def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Colour and dashes by the name of a run or solver: of ours the same on all pages, of others what is left, in their order.
+    """Colour and dashes by the name of a run or solver: fixed for our solvers on all pages, the next free ones for others.
 
     >>> looks(["reference", "mine", "pbd"])["pbd"] == looks(["fenicsx", "pbd"])["pbd"] == look_of(1)
     True
@@ -145,8 +145,8 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last; beyond three rows
-    the figure grows with them.
+    """Add a legend above, in as many columns as fit, with the mark of values that are not a number last; beyond three rows the
+    figure grows.
     """
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
@@ -164,14 +164,14 @@ def logarithmic(axes: Axes) -> None:
 
 
 def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
-    """The ``sizes`` and ``errors`` (n,) where an error can stand on a logarithmic axis."""
+    """The ``sizes`` and ``errors`` (n,) whose error can be drawn on a logarithmic axis."""
     kept = np.isfinite(errors) & (errors > 0)
     return sizes[kept], errors[kept]
 
 
 def plain_numbers(axis: Any) -> None:
-    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones only where hardly a major one is seen, and
-    there only 2 and 5 of each decade where more would overlap.
+    """Label the major ticks of a logarithmic axis with plain numbers, the minor ones only where fewer than two major ones are
+    visible, and there only 2 and 5 of each decade where more would overlap.
     """
 
     def minor(value: float, _: int | None) -> str:
@@ -184,7 +184,7 @@ def plain_numbers(axis: Any) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` alone, as wide as its place: ids begin with ``name``, and the page may set colours by their names."""
+    """The ``<svg>`` element alone, as wide as its place; ids begin with ``name``, and the page may set named colours."""
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
@@ -197,7 +197,7 @@ def inline(svg: str, name: str, title: str) -> str:
 
 
 def _named(colour: str) -> str:
-    """A colour as a page may change it, which stays what it is where the page says nothing.
+    """A colour as a CSS variable that a page may set, with the colour itself as default.
 
     >>> _named("#e8e8e8"), _named("#d55e00")
     ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')

@@ -15,9 +15,9 @@ from fem_reference.report.study_page import title_of
 from fem_reference.report.words import duration, listed, number, words
 
 MAIN = "surface_deviation.rms"
-# By name the head of a column of the table.
+# The heading of each column of the table, by name.
 HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
-# A change that is smaller by this factor than the least that is drawn otherwise is drawn there.
+# Changes are drawn down to this factor below the least visible one; smaller ones are drawn there, with their value.
 _DEPTH = 10.0
 
 
@@ -41,7 +41,7 @@ def page(found: CaseOmissions) -> Page:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """The things left out, in words: "all of them" where they are."""
+    """The effects or features left out, in words: "all of them" where that is so."""
     if not omission.left_out:
         return "nothing"
     every = {name for one in ablation.omissions for name in one.left_out}
@@ -60,13 +60,13 @@ def percent(share: float) -> str:
 
 
 def phases(found: CaseOmissions) -> list[str]:
-    """The phases that a run of the case knows apart and spends time on."""
+    """The phases on which some run of the case states that it spent time."""
     runs = [one for ablation in found.ablations for one in (ablation.whole, *ablation.omissions)]
     return [name for name in omissions.PHASES if any(one.phase(name) > 0 for one in runs)]
 
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
-    """The result of leaving things out of a run, in sentences."""
+    """The changes by leaving out effects or features of a run, in sentences."""
     if ablation.whole.status != "converged":
         return [f"Nothing was left out, as the whole run {ablation.whole.status}: {ablation.whole.message}"]
     if not ablation.omissions:
@@ -74,7 +74,7 @@ def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
     said = [_sentence(found, ablation, one) for one in ablation.omissions]
     if ablation.kept:
         material = listed([words(name) for name in ablation.kept])
-        said.append(f"Never left out is the material itself: {material}.")
+        said.append(f"The material itself is never left out: {material}.")
     return said
 
 
@@ -94,7 +94,7 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
 
 
 def _most(found: CaseOmissions, one: Omission) -> str:
-    """The change that is the most error bars."""
+    """The greatest change, in error bars, in words."""
     in_bars = omissions.in_bars(one.changes, found.bars).items()
     ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
@@ -104,7 +104,14 @@ def _most(found: CaseOmissions, one: Omission) -> str:
 
 def drawing(found: CaseOmissions) -> Drawing | None:
     """The change that an omission makes against the time that it saves; None where there is none to draw."""
-    points = {ablation.name: _points(ablation) for ablation in found.ablations}
+    points = {
+        ablation.name: [
+            (label(ablation, one), 100 * (1 - share), one.changes[MAIN])
+            for one in ablation.omissions
+            if MAIN in one.changes and not math.isnan(share := ablation.relative(one.seconds))
+        ]
+        for ablation in found.ablations
+    }
     changes = [change for rows in points.values() for _, _, change in rows]
     if not changes:
         return None
@@ -128,15 +135,8 @@ def drawing(found: CaseOmissions) -> Drawing | None:
     return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)
 
 
-def _points(ablation: Ablation) -> list[tuple[str, float, float]]:
-    """The omissions of a run that can be drawn: the name of each, the time saved [%] and the change of the surface [mm]."""
-    shares = ((one, ablation.relative(one.seconds)) for one in ablation.omissions if MAIN in one.changes)
-    known = [(one, share) for one, share in shares if not math.isnan(share)]
-    return [(label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in known]
-
-
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:
-    """The points of a run, none below ``floor`` [mm]: a change that is smaller is written beside its point."""
+    """Draw the points of a run, none below ``floor`` [mm]: a smaller change is written beside its point."""
     if rows:
         heights = [max(change, floor) for _, _, change in rows]
         axes.plot([saved for _, saved, _ in rows], heights, "o", color=colour, markersize=5, label=name)

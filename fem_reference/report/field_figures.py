@@ -1,4 +1,4 @@
-"""Drawings of a scalar example to stand inside a page: curves as SVG, maps and views as WebP."""
+"""Drawings of a scalar example inside a page: curves as SVG, maps and views as WebP."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ def convergence(example: Comparison) -> Drawing:
     title = "Error as the mesh is refined"
     lines = [(one.element, *positive(np.array(one.cells, float), np.array(one.errors))) for one in example.ladders]
     if not any(len(cells) for _, cells, _ in lines):
-        return Drawing(title, missing="no error that is a positive number")
+        return Drawing(title, missing="no error is a positive number")
 
     def draw(axes: Axes) -> None:
         for i, (element, cells, errors) in enumerate(lines):
@@ -107,7 +107,7 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The listing as its own ``plot`` command draws it, the others by their place."""
+    """The style of a line: for the listing that of its own ``plot`` command, for others by their index."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
@@ -124,8 +124,8 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
 
 
 def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
-    """The rival, the reference and their difference, each drawn by ``draw`` from values (n,) at the vertices, all values (k, n)
-    that share their scale, and the name of its colours.
+    """The rival, the reference and their difference, each drawn by ``draw`` from values (n,) at the vertices, all values (k, n) on
+    the same scale, and the name of the colour map.
     """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
@@ -139,7 +139,7 @@ def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]
         if np.isfinite(values).all():
             yield _webp(title, partial(draw, example=example, values=values, scale_of=scale_of, colours=colours))
         else:
-            yield Drawing(title, missing="its values are not a number, so that there is nothing to draw")
+            yield Drawing(title, missing="its values are not a number")
 
 
 def _called(run: Run) -> str:
@@ -159,7 +159,7 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
 
 
 def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """A map with the triangles on it, and the values as heights above the plate."""
+    """Draw a map with the triangles, and the values as heights above the plate."""
     mesh, scale = example.setup.mesh, _scale(scale_of, colours)
     x, y = mesh.points.T
     axes: Any = figure.add_subplot(1, 2, 1)
@@ -178,7 +178,7 @@ def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats
 
 
 def _scale(values: Floats, colours: str) -> Normalize:
-    """Colours from the least to the greatest value; of differences, as far below zero as above."""
+    """The colour scale from the least to the greatest value; for differences, symmetric about zero."""
     low, high = float(values.min()), float(values.max())
     if colours == DIFFERENCES:
         high = max(-low, high)
@@ -204,7 +204,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The whole surface, the belt about its mean height, and what is about its anchors (k, 3)."""
+    """The whole surface, the belt about its mean height, and the part about its anchors (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
@@ -218,7 +218,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 
 
 def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
+    """Draw a surface in space seen along z from the side of its anchors, y up, each window with its own colour scale."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
@@ -240,7 +240,7 @@ def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats,
 
 
 def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) -> PolyCollection:
-    """The triangles as seen along z, the furthest first, darker the more they are turned from the light."""
+    """The triangles as seen along z, the furthest first, darker the more they are turned away from the light."""
     corners = mesh.points[mesh.cells]
     across = normals(corners)
     light = np.abs(across @ _LIGHT) / np.linalg.norm(across, axis=1)

@@ -14,7 +14,7 @@ from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-AGREE = 1e-9  # of the greatest value: what only rounding differs by
+AGREE = 1e-9  # of the greatest value: a smaller difference is rounding
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
@@ -45,8 +45,8 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 def _section() -> dict[str, list[dict[str, str]]]:
     """The tables of the file about section 4.6 of the report: each ``difference`` between a ``text`` and its ``listing``, by
-    ``section``, with what was ``measured`` of it; and the ``caption`` of each ``figure`` of a ``case``, as its pictures are not
-    distributed.
+    ``section``, with its ``measured`` effect; and the ``caption`` of each ``figure`` of a ``case``, as pictures of the report are
+    not distributed.
     """
     return tomllib.loads(Path(__file__).with_name("octave_section.toml").read_text(encoding="utf-8"))
 
@@ -55,18 +55,18 @@ def apart(example: Comparison) -> str:
     """The difference at the vertices between the listing (else the first candidate) and the equation, in one sentence."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
-        return "there is a reference alone, and nothing beside it."
+        return "there is only a reference, and no candidate."
     name = f"the {other.name}" if other.solver == "listing" else other.name
     for run, called in ((other, name), (reference, "the reference")):
         if not np.isfinite(run.vertex_values[-1]).all():
-            return f"{called} is not a number, so that they cannot be compared."
+            return f"{called} is not a number, so they cannot be compared."
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
         return f"{name} and the equation agree; at the furthest vertex they differ by {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
     compared = (
-        f"{number(distance / size)} times as far as the equation's solution gets from zero"
+        f"{number(distance / size)} times the greatest value of the equation's solution"
         if size
         else "and the equation gives zero"
     )
@@ -77,7 +77,7 @@ def apart(example: Comparison) -> str:
 
 
 def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
-    """The least and the greatest value at a vertex, NaN where one is not a number, None where the run failed and says why."""
+    """The least and the greatest value at a vertex, NaN where one is not a number; None where the run failed."""
     if _lost(run):
         return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
@@ -89,7 +89,7 @@ def _lost(run: Run) -> bool:
 
 
 def seconds(run: Run) -> float | None:
-    """The time [s] that a run took, None where it does not say."""
+    """The time [s] that a run took, None where it is not stated."""
     cost = run.outcome.cost
     parts = [value for key, value in cost.items() if key.startswith("seconds_")]
     return sum(parts) if parts else cost.get("seconds")

@@ -1,4 +1,4 @@
-"""Pictures of a comparison: the choice of frames and views, and the job of the program that draws them."""
+"""Pictures of a comparison: the choice of frames and views, and the input of the program that draws them."""
 
 import logging
 import math
@@ -26,8 +26,8 @@ from fem_reference.runs.store import Run
 log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
-SECONDS = 600  # within which it must have drawn
-# Where a surface is as wide along two axes, those of the coordinates are taken: this distinguishes them, far above round-off.
+SECONDS = 600  # time limit of the drawing program
+# If a surface is equally wide along two axes, this relative difference, far above round-off, selects the coordinate axes.
 _TIES = 1e-11
 
 
@@ -48,7 +48,7 @@ class Shot:
 
 
 def shots(comparison: Comparison) -> list[Shot]:
-    """The reference at rest and where it moved furthest, and each candidate at its worst frame that can be drawn."""
+    """The reference at rest and at its greatest displacement, and each candidate at its worst frame that can be drawn."""
     reference = comparison.reference
     travel = to_same_vertex(reference, at_rest(reference)).max(axis=1)
     furthest = int(np.argmax(np.where(np.isfinite(travel), travel, -1.0)))
@@ -58,7 +58,7 @@ def shots(comparison: Comparison) -> list[Shot]:
 
 
 def of_comparison(comparison: Comparison) -> tuple[list[Shot], str]:
-    """The figures of the runs of a comparison, each at its worst frame, or none and what is missing."""
+    """The figures of the runs of a comparison, each at its worst frame, or none and the missing software."""
     return figures(comparison.setup, comparison.reference.surface, shots(comparison))
 
 
@@ -73,7 +73,7 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Sh
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
-    """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
+    """Two WebP pictures of each shot; MissingSoftware where the drawing program failed."""
     with scratch_folder() as folder:
         job = folder / "job.pickle"
         job.write_bytes(pickle.dumps(_job(setup, surface, wanted)))
@@ -114,8 +114,8 @@ def ramp() -> str:
 def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
-    From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
-    stand on the side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
+    From the first the silhouette is largest; the second is a quarter turn about the long axis from it. Both cameras are on the
+    side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
     """
     middle = surface.points.mean(axis=0)
     spread = np.cov((surface.points - middle).T)
@@ -130,7 +130,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True where most of ``points`` (n, 3) have a bone of closed form before them within four times ``view`` (3,) to the camera."""
+    """True where bones of closed form hide most of ``points`` (n, 3), within four times ``view`` (3,) towards the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
@@ -139,7 +139,7 @@ def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
 
 
 def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
-    """The shot of a candidate, none where no frame is finite."""
+    """The shot of a candidate at its worst frame; none where no frame is finite."""
     distances = to_same_vertex(run, comparison.reference)
     drawable = np.isfinite(distances).all(axis=1)
     if not drawable.any():
@@ -151,7 +151,7 @@ def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
 
 
 def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
-    """The contents of a job, as ``pictures`` names them."""
+    """The input of the drawing program, by the names in ``pictures``."""
     shots = [
         {"points": shot.points, "distances": shot.distances, "outline": shot.outline}
         | {"poses": [bone.pose(shot.number) for bone in setup.bones]}
@@ -188,6 +188,6 @@ def _run(words: list[str]) -> None:
 
 def _missing(what: str) -> MissingSoftware:
     return MissingSoftware(
-        f"No pictures: the program that draws them did not get through ({what}). It needs an OpenGL library; "
+        f"No pictures: the program that draws them failed ({what}). It needs an OpenGL library; "
         f"on Debian or Ubuntu: apt-get install {PACKAGES}"
     )

@@ -13,14 +13,14 @@ from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.report.tables import exerted, spread
 from fem_reference.runs.store import Run
-from fem_reference.scenes.case import Case, Expectation
+from fem_reference.scenes.case import Case
 
-# The statistics that are printed of a comparison; the page, JSON and CSV have them all.
+# The statistics printed for a comparison; the page, JSON and CSV have all.
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
 def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """The facts of interest on a case before it is solved, as words and numbers by name."""
+    """The main facts about a case before it is solved, as words and numbers by name."""
     return {
         "case": case.name,
         "title": case.title,
@@ -28,14 +28,12 @@ def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
         **of_case.facts(case, setup),
         "reference": " ".join([case.reference.solver, *(f"{k}={v}" for k, v in case.reference.settings.items())]),
         "candidates": {candidate.name: candidate.solver for candidate in case.candidate},
-        "expects": [f"{_what(e)}: {e.truth} within {e.within} ({e.kind})" for e in case.expect],
+        "expects": [
+            f"{one.of} {one.metric}{f' {one.statistic} at frame {one.frame}' if one.statistic is not None else ''}: "
+            f"{one.truth} within {one.within} ({one.kind})"
+            for one in case.expect
+        ],
     }
-
-
-def _what(expected: Expectation) -> str:
-    if expected.statistic is None:
-        return f"{expected.of} {expected.metric}"
-    return f"{expected.of} {expected.metric} {expected.statistic} at frame {expected.frame}"
 
 
 def comparison_text(result: Comparison) -> str:
@@ -54,7 +52,7 @@ def comparison_text(result: Comparison) -> str:
 
 
 def _judged(verdict: Verdict) -> str:
-    """A verdict as a line; of a number without a unit all digits that people read."""
+    """A verdict as a line of text, with more digits for a number without a unit."""
     expected = verdict.expectation
     if verdict.unit == "1":
         truth = f"expected {verdict.truth:.6g} within {verdict.within:.3g}"
@@ -76,7 +74,7 @@ def _number(value: float) -> str:
 
 
 def _worst(result: Comparison) -> list[str]:
-    """The worst deviations of each candidate in a line, in the statistics of the page's first table; of fields, all numbers."""
+    """The worst deviations of each candidate in a line, in the statistics of the page's first table; for fields, all numbers."""
     if "field" in result.reference.carries:
         measured = {"reference": result.changes["reference"]} | result.deviations
         return [line for name, measures in measured.items() for line in _measured(name, measures)]
@@ -92,16 +90,16 @@ def _worst(result: Comparison) -> list[str]:
 
 
 def _known(result: Comparison) -> list[str]:
-    """Error bars of the reference, a line a statistic; nothing without them."""
+    """Error bars of the reference, one line for each statistic; nothing without error bars."""
     if result.error_bars is None:
         return []
-    lines = ["error bars of the reference (its greatest change from rest; the error bar of it, where that is widest):"]
+    lines = ["error bars of the reference (its greatest change from rest, and the widest error bar of that change):"]
     for measure in (*result.changes[result.reference.name], *exerted(result.reference)):
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
             value = f"{measure.worst.value:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
-    lines.append("error bars of deviations from it (the error bar, where that is widest):")
+    lines.append("error bars of deviations from it (the widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
     lines += [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
     return [*lines, *filter(None, [spread(result)])]

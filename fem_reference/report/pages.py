@@ -1,5 +1,6 @@
-"""A page as a record, its template, how it is written, and the head in which it describes itself: the index shows that, and a page
-is written over only by the command that made it.
+"""The record of a page, its template, its writing, and its head, a description that the index shows.
+
+Only the command that made a page overwrites it.
 """
 
 import base64
@@ -26,21 +27,21 @@ from fem_reference.report import gallery
 from fem_reference.report.embedded import webp
 from fem_reference.report.words import duration, listed, number, ratio, title_of, words
 
-# Where the facts stand in the frame of all pages (base.html), and where the command that made it.
+# Places in the frame of all pages (base.html): of the facts, and of the command that made the page.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
 _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
 _HEAD = 2**17  # bytes of a file within which they are looked for
-_SIDE = 160  # of the small picture
+_SIDE = 160  # pixels of the thumbnail
 _PICTURE = re.compile(r'src="data:image/webp;base64,([A-Za-z0-9+/=]+)"')
 Headlines = tuple[tuple[str, str, str], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """The ``kind`` of a page, its ``title``, and its ``headlines``: by name a verdict (or none) and a sentence.
+    """The ``kind`` of a page, its ``title``, and its ``headlines``: name, verdict (may be empty) and sentence of each.
 
-    ``contents`` fill the ``template`` of the page. ``numbers`` are written beside it as JSON, and ``rows`` as CSV, where there are
-    any, under the name of the page or, where they have a name of their own, as ``numbers_name``.
+    ``contents`` fill the ``template`` of the page. ``numbers``, if any, are written beside it as JSON, and ``rows`` as CSV, under
+    ``numbers_name`` or else the name of the page.
     """
 
     kind: str
@@ -59,8 +60,8 @@ class Page:
 
 @dataclass(frozen=True)
 class PageHead:
-    """The facts of a page in its head: those of its ``Page``; the command that it was ``asked`` by, empty where a program wrote it;
-    when it was ``made``; and the source of a small ``picture``, if it has any.
+    """The facts in the head of a page: those of its ``Page``; the command that ``asked`` for it, empty if a program wrote it; the
+    time when it was ``made``; and the source of a thumbnail (``picture``), if it has any.
     """
 
     kind: str
@@ -72,7 +73,7 @@ class PageHead:
 
 
 def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
-    """Write the page ``name`` and its numbers into ``folder``; its path.
+    """Write the page ``name`` and its numbers into ``folder``; return its path.
 
     All files are made before the first is written, and each appears whole or not at all.
     """
@@ -87,7 +88,7 @@ def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
 
 
 def stamped(page: Page, asked: str = "") -> str:
-    """The page as text with its facts in its head, and above its title the command that made it."""
+    """The page as text, with the facts in its head and the command that made it above its title."""
     text = page.html()
     made = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M") if asked else ""
     head = PageHead(page.kind, page.title, page.headlines, asked, made, small_picture(text))
@@ -98,7 +99,7 @@ def stamped(page: Page, asked: str = "") -> str:
 
 def read(path: Path) -> PageHead | None:
     """The head of the page at ``path``; None where there is no page of ours, or a damaged one."""
-    if not path.is_file():  # a pipe would be waited for
+    if not path.is_file():  # reading a pipe would block
         return None
     try:
         with path.open("rb") as file:
@@ -109,8 +110,8 @@ def read(path: Path) -> PageHead | None:
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
-    """The ``name``, or with a number the first of it whose page, ``where(name)``, is not there or was made by the same command;
-    and a line that says so, empty where nothing was there.
+    """The ``name``, with a number if needed, whose page at ``where(name)`` does not exist or was made by the same command; and a
+    line that reports a page that exists, else an empty text.
     """
     for i in count(1):
         numbered = name if i == 1 else f"{name}-{i}"
@@ -124,7 +125,7 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
 
 
 def small_picture(text: str) -> str:
-    """The first picture of a page in small, none where it has none that can be read."""
+    """The thumbnail of the first picture of a page, empty where none can be read."""
     found = _PICTURE.search(text)
     if found is None:
         return ""
@@ -138,18 +139,18 @@ def small_picture(text: str) -> str:
 
 
 def by_name(*functions: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
-    """The ``functions`` that a template calls by their own names."""
+    """The ``functions`` by their own names, for a template."""
     return {one.__name__: one for one in functions}
 
 
 def template(name: str) -> jinja2.Template:
-    """The template in the file ``name`` beside this one: its contents are escaped, and a name that it lacks is an error."""
+    """The template in the file ``name`` beside this one: its contents are escaped, and an undefined name is an error."""
     return _environment().get_template(name)
 
 
 @cache
 def _environment() -> jinja2.Environment:
-    """The environment of the templates, each of which is compiled when it is first asked for."""
+    """The environment of the templates, which are compiled at first use."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,

@@ -1,10 +1,10 @@
-"""The program that draws the pictures of a job file of ours: ``python -P pictures.py JOB.pickle FOLDER``.
+"""The program that draws the pictures of a job file: ``python -P pictures.py JOB.pickle FOLDER``.
 
-Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
+It is a separate process, as VTK ends the drawing process without an exception if there is no OpenGL library.
 
-The job has ``top``, the end of the colour scale [mm]; ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, of each
-of the ``bones`` its points and triangles, and ``shots``: ``points`` (n, 3), ``poses`` of the bones (4, 4), ``distances`` (n,) [mm]
-to colour by, and ``outline`` (n, 3), the body whose outline is drawn over it, both or None. View k of shot i becomes ``i_k.webp``.
+The job has ``top``, the end of the colour scale [mm]; ``triangles`` (m, 3); ``directions`` (2, 3) towards the two cameras; points
+and triangles of each of the ``bones``; and ``shots``: ``points`` (n, 3), ``poses`` of the bones (4, 4), ``distances`` (n,) [mm] to
+colour by, and ``outline`` (n, 3), a body whose outline is drawn on top, both or None. View k of shot i becomes ``i_k.webp``.
 """
 
 import pickle
@@ -20,7 +20,7 @@ from PIL import Image
 COLOURS = "viridis"
 SIDE = 840
 _OVERSAMPLING = 2
-# A pixel of a body is on its outline where one of those that are four beside it is not of the body.
+# A pixel of a body belongs to its outline if a pixel at a distance of four is outside the body.
 _NEAR = np.logical_and.outer(*[np.isin(np.arange(9), (0, 4, 8))] * 2)
 _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 

@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
+"""The page ``table-5-1``: numbers for the speed and precision of solvers, which the report rates with pluses and minuses."""
 
 import math
 from typing import Any
@@ -16,9 +16,9 @@ from fem_reference.report.drawings import Drawing, drawn, logarithmic, looks
 from fem_reference.report.pages import Page
 from fem_reference.report.words import under_load
 
-# What is measured: metric, statistic, words above the column, unit.
+# Columns: metric, statistic, heading, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
-# In the first table, which is over all scenes.
+# Columns of the first table, over all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
 
@@ -91,7 +91,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
 
 
 def _drawing(table: Table) -> Drawing:
-    """Deviation of the surface against the time of a frame, everybody on every scene; a legend of colours and one of marks."""
+    """Deviation of the surface against the time of a frame, of every solver on every scene; legends of colours and of marks."""
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
     # The reference first.
     colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))
@@ -116,7 +116,7 @@ def _drawing(table: Table) -> Drawing:
 
 
 def _label_of(one: SolverResult) -> str:
-    """The name of a solver, with its kind where it is somebody else's, which may have the name of one of ours."""
+    """The name of a solver, with its kind if it is not ours, as it may share the name of one of ours."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.kind.lower()})"
 

@@ -34,12 +34,12 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, or the nearest to the ``limit`` of the error: its error in a ``unit``, its time, and where it was measured."""
+    """The setting, or the nearest one to the ``limit`` of the error, with its error in a ``unit``, its time, and its evidence."""
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()
     if found.best is None:
-        lines.append(f"none of {found.count} settings meets what is asked on {case} ({measured})")
+        lines.append(f"none of {found.count} settings meets the request on {case} ({measured})")
     if one is None:
         return lines[0]
     lines.append(f"{'' if found.best else 'the nearest: '}{one.point.solver}: {_settings(one)}")
@@ -49,7 +49,9 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
         lines += _reason(one, unit, limit)
     if not found.measured:
         margins = found.margins
-        lines.append(f"margins in it: {number(margins.error)} times the error, {number(margins.time)} times the time")
+        lines.append(
+            f"margins included: {number(margins.error)} times the error, {number(margins.time)} times the time"
+        )
     if warning := under_load(found.loads, LOADED):
         own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""
         lines.append(f"{warning}{own}")
@@ -113,7 +115,7 @@ def _reason(one: Expected, unit: str, limit: float) -> list[str]:
     """The bar of the truth as the reason why the nearest setting does not meet the ``limit`` of the error, where that is so."""
     if one.bar >= limit:
         known = f"{number(one.bar)} {unit}"
-        return [f"the truth is known no better than {known}: nothing can be said to be nearer than that"]
+        return [f"the truth itself is known only to {known}: no smaller error can be proven"]
     if one.error > limit >= one.error - one.bar:
         within = f"{number(limit)} {unit}"
         return [f"without the bar it would be within the {within}: the error bar of the truth is too large to decide"]

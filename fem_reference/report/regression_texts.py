@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
 from fem_reference.io.texts import finite
 
-# A pull request is read by people: the worst judgements, and how many there are.
+# The greatest number of judgements in a text; the others are only counted.
 MOST_ROWS = 15
 _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
@@ -36,16 +36,16 @@ def facts(check: Check) -> dict[str, Any]:
 
 
 def text(check: Check) -> str:
-    """The worst failures as lines of text, why others are inconclusive, and the verdict."""
+    """The worst failures as lines of text, the reasons why others are inconclusive, and the verdict."""
     lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
-    silent: dict[str, list[str]] = {}
+    open_: dict[str, list[str]] = {}
     for one in _of(check, "inconclusive"):
-        silent.setdefault(one.why, []).append(_named(one))
-    lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in silent.items()])
+        open_.setdefault(one.why, []).append(_named(one))
+    lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in open_.items()])
     lines += _notes(check)
     if _of(check, "fail"):
         lines.append(
-            f"what is nearer to the reference and what is further: compare {check.case} --candidate ... --against the baseline"
+            f"to see which statistics are nearer or further away: compare {check.case} --candidate ... --against the baseline"
         )
     lines += [f"{check.candidate} on {check.case}:", *(f"  {line}" for line in _answers(check))]
     return "\n".join([*lines, f"verdict: {check.word}"])
@@ -65,8 +65,8 @@ def markdown(check: Check) -> str:
 
 
 def junit(check: Check, seconds: float) -> str:
-    """One suite for the candidate, one case for each judgement; where nothing can be said, the case is skipped. ``seconds`` is
-    what the whole check took. The verdict and the doubts about the reference are properties: a doubtful pass is no failure.
+    """One suite for the candidate, one test case for each judgement, skipped if inconclusive. ``seconds``: the time of the check.
+    The verdict and the doubts about the reference are properties: a doubtful pass is no failure.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
@@ -89,7 +89,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a headline in Markdown, that say ``why`` nothing was judged: older files would mislead."""
+    """A JUnit suite with one error, and a Markdown text, that state ``why`` nothing was judged and replace older files."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
@@ -122,9 +122,9 @@ def _named(one: Judgement) -> str:
 
 
 def _most(lines: list[str]) -> list[str]:
-    """The first ``MOST_ROWS`` of ``lines``, and how many there are besides."""
+    """The first ``MOST_ROWS`` of ``lines``, and the number of the others."""
     more = len(lines) - MOST_ROWS
-    return [*lines[:MOST_ROWS], f"and {more} more like the last, which --json and --junit name"] if more > 0 else lines
+    return [*lines[:MOST_ROWS], f"and {more} more like the last, listed by --json and --junit"] if more > 0 else lines
 
 
 def _few(names: list[str]) -> str:
@@ -132,7 +132,7 @@ def _few(names: list[str]) -> str:
 
 
 def _answers(check: Check) -> list[str]:
-    """Each question with its answer and how many statistics came out how."""
+    """Each question with its answer and the number of statistics of each verdict."""
     asked: tuple[tuple[Question, str], ...] = (
         ("unchanged", "as it was"),
         ("within", "as near to the reference as allowed"),

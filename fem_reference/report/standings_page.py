@@ -1,7 +1,5 @@
 """The page ``standings``: solvers of all kinds over cases, one table on top, and a table of each case."""
 
-from collections.abc import Iterable
-
 from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
 from fem_reference.metrics import described
 from fem_reference.report.pages import Page
@@ -14,10 +12,14 @@ def page(found: Standings) -> Page:
     """The page of standings."""
     longest = max((sum(row.split.values()) for row in found.rows), default=0.0)
     limits = sorted({row.time_limit for row in found.rows if row.time_limit is not None})
+    known = {
+        case: {name for row in found.of(case) for name, value in (row.worst | row.bars).items() if value is not None}
+        for case in found.cases
+    }
     contents = {
         "limits": [f"{limit:g} s" for limit in limits],
         "found": found,
-        "columns": {case: _columns(found.of(case)) for case in found.cases},
+        "columns": {case: [column for column in COLUMNS if column[0] in names] for case, names in known.items()},
         "longest": longest or 1.0,
         "matched": (MATCHED_ERROR, MATCHED_TIME),
     }
@@ -26,14 +28,8 @@ def page(found: Standings) -> Page:
     return Page("standings", "Standings", (("", "", said),), "standings_page.html", contents, numbers)
 
 
-def _columns(rows: Iterable[Standing]) -> list[tuple[str, str, str]]:
-    """The columns of a case in which a row has a value: few solvers have forces."""
-    known = {name for row in rows for name, value in (*row.worst.items(), *row.bars.items()) if value is not None}
-    return [column for column in COLUMNS if column[0] in known]
-
-
 def text(found: Standings) -> str:
-    """The rows, what is missing and what changed, as lines of text."""
+    """The rows, the missing ones and the changes, as lines of text."""
     lines = [_line(row) for case in found.cases for row in found.of(case)]
     lines += [f"{name}: left out, {why}" for name, why in found.missing.items()]
     return "\n".join([*lines, *(f"changed: {line}" for line in found.changes)])

@@ -13,7 +13,7 @@ from fem_reference.report.pages import Page
 
 _MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "inconclusive": "?"}
 _MARKS |= {"not applicable": "\N{EN DASH}", "no solution": "∅"}
-_NOTHING_TO_SAY = ("ok", "not applicable", "no solution")
+_WITHOUT_DEFECT = ("ok", "not applicable", "no solution")
 _SIDE, _OVERSAMPLING = 220, 2
 # The camera looks along this direction, from in front, above and to the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
@@ -39,18 +39,18 @@ def summary(found: Stress) -> str:
 
 
 def text(found: Stress) -> str:
-    """The matrix as lines of text, and a sentence for all that is not ok."""
+    """The matrix as lines of text, with a sentence for each cell with a defect."""
     width = max((len(case.name) for case in found.cases), default=0)
     lines = [summary(found)]
     for case in found.cases:
         cells = [found.at(case.name, solver) for solver in found.solvers]
         lines.append(f"{case.name:{width}}  " + "  ".join(f"{cell.solver} {cell.verdict}" for cell in cells))
-        lines += [f"  {cell.solver}: {cell.sentence}" for cell in cells if cell.verdict not in _NOTHING_TO_SAY]
+        lines += [f"  {cell.solver}: {cell.sentence}" for cell in cells if cell.verdict not in _WITHOUT_DEFECT]
     return "\n".join(lines)
 
 
 def picture(scene: Scene) -> str:
-    """The body as an image: triangles lit from the camera, blue where their inner side is seen, and a ring around the place."""
+    """The body as an image: triangles lit from the camera, blue where their inner side is visible, and a ring at the place."""
     forward = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
@@ -77,7 +77,7 @@ def picture(scene: Scene) -> str:
 
 
 def _colour(facing: float) -> tuple[int, int, int]:
-    """The colour of a triangle whose normal has this component along the view: below 0 its outer side is seen."""
+    """The colour of a triangle whose normal has this component along the view: below 0 its outer side is visible."""
     if facing > 0:
         return _BACK
     red, green, blue = (round(dark + (lit - dark) * -facing) for dark, lit in zip(_DARK, _LIT, strict=True))
@@ -85,8 +85,8 @@ def _colour(facing: float) -> tuple[int, int, int]:
 
 
 def history(of: History, bound: float) -> dict[str, Any]:
-    """A quantity over frames as its drawing shows it: the title, the ``points`` and the places that are ``lost``, the height of the
-    ``limit``, which a healthy run keeps below, and both ends of the axes; logarithmic where it spans decades.
+    """The drawing of a quantity over frames: the title, the ``points``, the places of frames without a number (``lost``), the
+    height of the ``limit`` of a healthy run, and both ends of the axes; logarithmic where the values span decades.
     """
     values = np.asarray(of.values, float)
     known = np.isfinite(values)

@@ -25,13 +25,13 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# What the tables are about and matched by.
+# The statistic in the tables, and the quantities that they match.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
 
 def page(study: Study) -> Page:
-    """The page of what accuracy costs."""
+    """The page of the cost of accuracy."""
     moved = transfers(study.cases, MAIN) if len(study.cases) > 1 else ()
     cases = [cost_study.facts(case, study.origin) for case in study.cases]
     contents = {
@@ -69,7 +69,7 @@ def page(study: Study) -> Page:
 
 
 def shown(case: CaseStudy) -> list[str]:
-    """The statistics with a front: those in which two points differ from the truth, as a case without joints has no moment arms."""
+    """The statistics with a front: those with errors of two points or more (a case without joints has no moment arms)."""
     known = [name for point in case.points for name in point.errors]
     return [name for name in map(".".join, described("rank")) if known.count(name) > 1]
 
@@ -92,7 +92,7 @@ def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     if REFERENCE in prices and others:
         nearest = min(others, key=lambda solver: others[solver])
         if prices[REFERENCE].best < others[nearest]:
-            said.append(f"Below {number(others[nearest])} {unit}, the best of {nearest}, only the reference gets.")
+            said.append(f"Only the reference gets below {number(others[nearest])} {unit}, the best of {nearest}.")
     return said
 
 
@@ -112,7 +112,7 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
     """Tables at the same time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
-    # What "at most" means of an error here is what it means to the verb recommend.
+    # An error "at most" means the same here as in the verb recommend.
     asked.append((case.certain, TIME, error, TIME))
     return [
         (
@@ -125,7 +125,7 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
 
 
 def answered(case: CaseStudy) -> tuple[Answer, ...]:
-    """The answers to what is asked first, by the settings that the verb recommend takes; none of a case without settings."""
+    """The answers to the usual requests, by the settings that the verb recommend considers; none for a case without settings."""
     known = known_settings(case.features, case.case, [case], MAIN).settings
     return answers(known) if known else ()
 
@@ -181,7 +181,7 @@ def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """Pairs of each point with its measured error, also below the truth's bar, and with the error that counts."""
+    """Pairs of each point with its measured error, which may be below the truth's bar, and with the error that counts."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)
@@ -189,7 +189,7 @@ def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
 
 
 def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
-    """The points of a solver as they are shown, its front as they count as a line, its default settings as rings."""
+    """Draw the points of a solver, its front by the errors that count as a line, and its default settings as rings."""
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return
@@ -201,12 +201,12 @@ def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver:
 
 
 def _plot(axes: Axes, pairs: list[tuple[float, float]], *style: str, **look: Any) -> None:
-    """Pairs of an error and a cost, the cost along the axis."""
+    """Draw pairs of an error and a cost, the cost along the horizontal axis."""
     axes.plot([cost for _, cost in pairs], [error for error, _ in pairs], *style, **look)
 
 
 def _data(study: Study) -> dict[str, Any]:
-    """The contents of the drawing with free axes."""
+    """The data of the drawing with selectable axes."""
 
     def facts(one: Point) -> dict[str, Any]:
         named = {name: getattr(one, name) for name in ("solver", "label", "errors", "costs")}

@@ -19,7 +19,7 @@ from fem_reference.scenes.case import Case
 
 MEASURES = "measures"  # the name of the files
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
-# The columns of the first table: metric, statistic, the words above a group and above the column, unit.
+# The columns of the first table: metric, statistic, headings of the group and the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
@@ -33,9 +33,9 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
-    forces and inversion numbers that its solver recorded; ``doubts`` the reasons to doubt the reference, in words; ``from_rest``
-    the change from rest of every run, with its forces; ``error_bars`` the error bars of the reference and ``rankings`` the solvers
-    that they separate, both empty without bars; ``unsound`` why the frames of a candidate are no answer.
+    forces and inversion numbers that its solver recorded; ``doubts``: the reasons to doubt the reference, in words; ``from_rest``:
+    the change from rest of every run, with its forces; ``error_bars``: those of the reference; ``rankings``: the solvers that the
+    bars separate, both empty without bars; ``unsound``: the reasons why the frames of candidates are no answer.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -112,7 +112,7 @@ def exerted(run: Run) -> tuple[Measure, ...]:
 
 
 def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
-    """One row a statistic and frame, with the keys ``COLUMNS``."""
+    """One row for each statistic and frame, with the keys ``COLUMNS``."""
     return [
         dict(zip(COLUMNS, (run.name, one.metric, one.statistic, number, finite(value), one.unit), strict=True))
         for one in measures
@@ -121,7 +121,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row a frame; ``model``: by how much another model of springs changes the statistic."""
+    """One row for each frame; ``model``: the change of the statistic by another model of springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
     model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [

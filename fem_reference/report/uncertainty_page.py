@@ -1,4 +1,4 @@
-"""The page of unknown parameters: the bands of answers over the motion, the sensitivities, and the candidates beside the bands."""
+"""The page of unknown parameters: bands of answers over the motion, sensitivities, and candidates beside the bands."""
 
 import math
 from functools import partial
@@ -12,7 +12,7 @@ from fem_reference.report.drawings import REFERENCE, Drawing, drawn, looks, over
 from fem_reference.report.pages import Page
 from fem_reference.report.words import listed, number
 
-# Of the height of a band, how far beyond it lines of candidates are drawn.
+# Room for lines of candidates beyond a band, in heights of the band.
 _BEYOND = 1.5
 _SHADE, _FIRST, _TOTAL = "#888888", "#0072b2", "#56b4e9"
 
@@ -38,7 +38,7 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface beside the bar of the reference, its cause, and where the candidates are."""
+    """The result in sentences: the band of the surface, the bar of the reference, the main cause, and the candidates' places."""
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
@@ -46,9 +46,12 @@ def sentences(found: Uncertainty) -> list[str]:
         one.candidate: one.word for one in found.placed if found.bands and one.quantity == found.bands[0].quantity
     }
     for word, text in (
-        ("inside", "Candidates whose surface errs less than the unknown parameters move it: {}."),
-        ("undecided", "Candidates too near to the edge of the band to say, with the error bar of the reference: {}."),
-        ("outside", "Candidates whose surface errs more than the unknown parameters move it: {}."),
+        ("inside", "Candidates whose surface error is smaller than the effect of the unknown parameters: {}."),
+        (
+            "undecided",
+            "Candidates too near to the edge of the band to decide, given the error bar of the reference: {}.",
+        ),
+        ("outside", "Candidates whose surface error is larger than the effect of the unknown parameters: {}."),
         ("no answer", "Candidates without an answer in some frame: {}."),
     ):
         named = [name for name, one in places.items() if one == word]
@@ -63,7 +66,7 @@ def _sentence(found: Uncertainty, band: Band) -> str:
     known = "" if math.isnan(bar) else f", where the reference itself is known to {number(bar)} {band.unit}"
     most = max(band.total, key=lambda key: band.total[key], default="")
     cause = {one.key: one.title for one in found.parameters}.get(most, "")
-    why = f" Most of it is by {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
+    why = f" Its main cause is {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
     return (
         f"In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within {number(band.width)} "
         f"{band.unit} of this case's, rms{known}.{why}"
@@ -82,7 +85,7 @@ def beside(found: Uncertainty, candidate: str) -> dict[str, Placed]:
 
 
 def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
-    """The word on a candidate beside a band, and what it stands on."""
+    """The verdict on a candidate beside a band, and its reason."""
     if one is None or not one.word:
         return "\N{EN DASH}", ""
     frames = [place for place in one.places if place]
@@ -93,7 +96,7 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames, with the error bar of the reference and the candidates: all less the case's own answer, beside which
+    """A band over the frames, with the error bar of the reference and the candidates, each minus the case's own answer: otherwise
     a band would often be too narrow to see.
     """
     title = band.title if band.distance else f"{band.title}: difference from that of the case"
@@ -122,7 +125,7 @@ def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
 
 
 def shares(found: Uncertainty, band: Band) -> Drawing:
-    """The sensitivities of a quantity by parameter, as bars; the reason where there are none."""
+    """The sensitivities of a quantity by parameter, as bars, or the reason why there are none."""
     title = f"Shares of the variance: {band.title[0].lower()}{band.title[1:]}"
     if not band.first:
         return Drawing(title, missing=band.unreliable or "the quantity does not vary")

@@ -21,7 +21,7 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = 1e-8, 1e3  # shares of the tolerance that the overview can show; what is beyond stands at its edge
+LEAST, GREATEST = 1e-8, 1e3  # shares of the tolerance that the overview can show; others are drawn at its edge
 _ROW = 0.175  # height of a row of the overview [in]
 
 
@@ -43,7 +43,7 @@ def page(verification: Verification) -> Page:
 
 
 def text(verification: Verification) -> str:
-    """One line for each result, in columns below their heads, and the verdict."""
+    """One line for each result, in columns with headings, and the verdict."""
     rows = [_HEADS, *map(_cells, verification.results)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
@@ -91,7 +91,7 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error as a share of its bound, NaN where nothing was measured; infinite where no error is allowed and there is one."""
+    """The error as a share of its bound, NaN where nothing was measured; infinite for an error where none is allowed."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0
@@ -118,12 +118,12 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
         _style_overview(figure, axes, (low, high))
 
     rows = len(results) + len(groups)
-    title = "Error as a share of what is allowed"
+    title = "Error as a share of the tolerance"
     return drawn("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
-    """A result at its share; a hollow triangle at the edge beyond which it is, a cross where it is not a number."""
+    """Draw a result at its share; a hollow triangle at the edge if it is beyond, a cross if it is not a number."""
     low, high = limits
     value = share(one)
     look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}
@@ -163,12 +163,12 @@ def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> 
 
 
 def drawable(one: Result) -> bool:
-    """True with two meshes or more whose errors can stand on a logarithmic axis."""
+    """True with two meshes or more whose errors can be drawn on a logarithmic axis."""
     return len(_errors(one)[0]) > 1
 
 
 def convergence(one: Result) -> Drawing:
-    """Error over mesh size on logarithmic axes, beside the whole power that is nearest to its order."""
+    """Error over mesh size on logarithmic axes, beside a line with the integer slope nearest to its order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

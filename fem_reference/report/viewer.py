@@ -1,18 +1,18 @@
 """The 3D view of the page: every frame of every run, packed into the page with the library that draws it in a browser.
 
-What ``viewer.js`` unpacks is one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
+``viewer.js`` unpacks one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
 
     library    text of each file of three.js
-    frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: of magnitudes, of what has a sign,
+    frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: of magnitudes, of signed values,
                and of fibres
     low, step  position = low + step * whole number from 0 to 65535 [mm]
     triangles  whole numbers (m, 3), of 4 bytes, the same for every run
-    runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): how many
-               vertices are outside of the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the
-               frame before, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
+    runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): number of
+               vertices outside the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the previous
+               frame, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
     force      the greatest force drawn [N];  attached  the vertices that are attached to bones
-    and what ``viewer_fields`` says: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
+    and, as described in ``viewer_fields``: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
 
@@ -38,8 +38,7 @@ from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
-# How many bytes the positions and levels of all frames may have before they are compressed: about as many as base64 needs for what
-# is left.
+# Bytes of positions and levels of all frames before compression: about as many as base64 needs after it.
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
@@ -57,7 +56,7 @@ class _Box:
         return cls(low, max(float((high - low).max()) / _LEVELS, 1e-9))
 
     def whole(self, points: Floats) -> NDArray[np.uint16]:
-        """The nearest whole numbers; 0 for what is not a number, the edge of the box for what is outside of it."""
+        """The nearest whole numbers; 0 for NaN, the edge of the box for points outside it."""
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
         return np.nan_to_num(steps, nan=0.0).astype(np.uint16)
@@ -68,10 +67,10 @@ class _Box:
 
 def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
     """The contents of the template of the 3D view: the ``data`` for the script, the names of the ``candidates`` and ``quantities``,
-    the frame ``numbers``, one frame in how many is drawn (``every``: more than one where positions would have more bytes than
-    ``budget``), the greatest ``error`` of a coordinate [mm], the colours of fibres (``warm``) and where on their scale [%] which
-    ``stretches`` are, the greatest ``force`` drawn [N], 0 without any, whether
-    vertices are ``attached`` or ``touched``, how ``near`` [mm] that is, and ``version`` and ``licence`` of the library.
+    the frame ``numbers``, the stride ``every`` of frames drawn (above 1 where positions would exceed ``budget`` bytes), the
+    greatest ``error`` of a coordinate [mm], the colours of fibres (``warm``) and the places of ``stretches`` on their scale [%],
+    the greatest ``force`` drawn [N], 0 without any, True for ``attached`` or ``touched`` vertices, the distance ``near`` [mm] of
+    the latter, and ``version`` and ``licence`` of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
     every = _every(shown, budget)
@@ -96,10 +95,12 @@ def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
 
 
 def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any]:
-    """The object that this module's text describes, of the runs ``shown``, the reference first."""
+    """The object that the module's docstring describes, for the runs ``shown``, the reference first."""
     reference, numbers = comparison.reference, comparison.reference.numbers[::every]
     frames = {run.name: _frames(run, numbers) for run in shown}
-    own = np.concatenate([reference.surface.points[None], frames[reference.name]])  # even where it reached no frame
+    own = np.concatenate(
+        [reference.surface.points[None], frames[reference.name]]
+    )  # not empty without any reached frame
     box = _box(own, list(frames.values()))
     fields = Fields(comparison, shown, numbers)
     runs, top = _runs(frames, reference.name, box)
@@ -119,7 +120,9 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
         "both": _stops("coolwarm"),
         "warm": _stops("plasma"),
         "quantities": distance + fields.quantities(),
-        "force": _greatest_force(runs),
+        "force": max(
+            (float(np.linalg.norm(one[3:])) for row in runs for there in row["forces"] for one in there), default=0.0
+        ),
         "attached": np.unique(comparison.setup.attached_vertices).tolist(),
         "bars": fields.bars(),
         "fibres": fields.fibres(points),
@@ -132,14 +135,8 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     }
 
 
-def _greatest_force(runs: list[dict[str, Any]]) -> float:
-    """The greatest magnitude [N] of the arrows of all ``runs``, 0 without any."""
-    forces = (one[3:] for row in runs for frame in row["forces"] for one in frame)
-    return max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-
-
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """The places on a scale [%] of its ends, and of rest where it is not near one of them."""
+    """The places on a scale [%] of its ends, and of rest unless that is near an end."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -147,7 +144,7 @@ def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
 
 
 def _every(shown: list[Run], budget: int) -> int:
-    """One frame in how many keeps the positions of all runs within ``budget`` bytes, as far as two frames are left."""
+    """The stride of frames that keeps the positions of all runs within ``budget`` bytes, but leaves two frames."""
     count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
     frame = len(shown) * vertices * (3 * 2 + 2)  # positions of two bytes, and two quantities of one
     strides = range(1, max(count, 2))
@@ -155,13 +152,13 @@ def _every(shown: list[Run], budget: int) -> int:
 
 
 def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
-    """Positions (f, n, 3) of a run at frame ``numbers``, NaN all over where one is not wholly known."""
+    """Positions (f, n, 3) of a run at frame ``numbers``; all NaN in a frame that is not wholly known."""
     known = np.isfinite(run.positions).all(axis=(1, 2), keepdims=True)
     return at_numbers(run, np.where(known, run.positions, np.nan), numbers)
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """Around all frames, but beyond the reference's by at most its own length on each side: a run may scatter."""
+    """The box around all frames, which exceeds the reference's by at most its length on each side, as a run may scatter."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
@@ -199,14 +196,14 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[di
 
 
 def _last_finite(frames: Floats) -> Floats:
-    """The frames with the last that was reached in the place of one that was not, which then costs no bytes."""
+    """The frames, with the last reached one in place of one that was not reached, which then costs no bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
     return np.asarray(frames[last])
 
 
 def _positions(frames: Floats, box: _Box) -> str:
-    """Positions (f, n, 3) in the form that this module's text describes."""
+    """Positions (f, n, 3) in the form that the module's docstring describes."""
     whole = box.whole(frames)
     steps = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).view(np.int16)
     zigzag = ((steps << 1) ^ (steps >> 15)).view(np.uint16)

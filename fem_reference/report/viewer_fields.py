@@ -1,13 +1,13 @@
 """Colours of surfaces and of fibres in the 3D view, beside the distance to the same vertex, packed into few bytes.
 
-quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
-runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
-            magnitude; points: of the fibres, as positions
-bars        by quantity and frame the error bar [mm] of the reference; null where it is unknown, absent without bars
-fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
-touched     of each run that touches a bone (f, n) of one byte: 1 within ``NEAR`` of a bone, but for attached vertices
-forces      of each run by frame the arrows: point of application [mm] and force on a bone [N], six numbers each
-joints      of each bone that moves its name, unit, and by frame the angle or the distance
+quantities  name, signed, and top, the greatest magnitude [mm]: value = sign * top * (level / 127)^2
+runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the greatest magnitude by
+            quantity and frame; points: of the fibres, as positions
+bars        error bar [mm] of the reference by quantity and frame; null where it is unknown, absent without bars
+fibres      lines (k,): number of points of each; rest: length [mm] of each piece, line by line; low, high: ends of all stretches
+touched     for each run that touches a bone (f, n) of one byte: 1 within ``NEAR`` of a bone, except for attached vertices
+forces      arrows of each run by frame: point of application [mm] and force on a bone [N], six numbers each
+joints      name, unit, and angle or distance by frame of each bone that moves
 """
 
 import math
@@ -29,12 +29,12 @@ from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report.at_frames import motions
 from fem_reference.runs.store import Run, at_numbers
 
-FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
-NEAR = 0.2  # [mm]: a vertex so near a bone touches it
+FIBRES, POINTS = 30, 12  # greatest number of fibres drawn, and of points of each
+NEAR = 0.2  # distance [mm] within which a vertex touches a bone
 _LEVELS = 127
-# The statistic of the surface's deviation that is the greatest of a quantity.
+# The statistic of the surface's deviation that is the maximum of a quantity.
 _BARS = {"distance": "max", "surface": "hausdorff"}
-_FAR = 1e6  # [mm]: beyond, a fibre is nowhere
+_FAR = 1e6  # distance [mm] beyond which a fibre counts as not known
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Fields:
 
     @property
     def context(self) -> MeasurementContext:
-        """The context that all runs are measured in."""
+        """The measurement context of all runs."""
         assert isinstance(self.comparison.context, MeasurementContext)  # of a muscle
         return self.comparison.context
 
@@ -56,7 +56,11 @@ class Fields:
         """The fibres that are drawn, and the indices of their points."""
         offsets = self.context.fibres.offsets
         chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
-        points = [_spread(offsets[i], offsets[i + 1]) for i in chosen]
+        spans = [(offsets[i], offsets[i + 1]) for i in chosen]
+        points = [
+            np.unique(np.linspace(first, end - 1, min(POINTS, end - first)).round().astype(np.int64))
+            for first, end in spans
+        ]
         ends = np.cumsum([0, *(len(own) for own in points)])
         indices = np.concatenate([np.zeros(0, np.int64), *points])
         return Polylines(self.context.fibres.points[indices], ends), indices
@@ -77,9 +81,9 @@ class Fields:
         }
 
     def touched(self, run: Run) -> NDArray[np.bool_] | None:
-        """The vertices (f, n) that are within ``NEAR`` of a bone and not attached; None where that is not known."""
+        """True (f, n) for vertices within ``NEAR`` of a bone and not attached; None where that is not known."""
         gaps = self.gaps[run.name]
-        return None if gaps is None else np.less_equal(gaps, NEAR)  # NaN is not
+        return None if gaps is None else np.less_equal(gaps, NEAR)  # False for NaN
 
     @cached_property
     def surfaces(self) -> dict[str, dict[str, Floats]]:
@@ -94,7 +98,7 @@ class Fields:
         return {name: values for name, values in found.items() if values}
 
     def quantities(self) -> list[dict[str, Any]]:
-        """The quantities that can be chosen, beside the distance, which the positions give."""
+        """The quantities that can be chosen, beside the distance, which follows from the positions."""
         return [
             {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
             for name, values in self.surfaces.items()
@@ -141,7 +145,9 @@ class Fields:
         rest = lengths(lines.points)
         stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
         known = stretches[np.isfinite(stretches)]
-        low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))  # one piece does not set the scale
+        low, high = (
+            float(np.percentile(known, share)) for share in (0.1, 99.9)
+        )  # so that no single piece sets the scale
         scale = {"low": min(low, 1.0), "high": max(high, 1.0)}
         return {"lines": np.diff(ends).tolist(), "rest": np.round(rest, 5).tolist(), **scale}
 

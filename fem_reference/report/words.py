@@ -1,4 +1,4 @@
-"""Numbers and names as people read them: three significant digits, a true minus sign, powers of ten, plain words."""
+"""Numbers and names for readers: three significant digits, a true minus sign, powers of ten, plain words."""
 
 import math
 from collections.abc import Iterable
@@ -43,8 +43,8 @@ def duration(seconds: float | None) -> str:
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning where times were measured on a machine of which other processes kept a share of more than ``most`` busy; NaN is a
-    share that is not known.
+    """A warning where other processes kept more than a share of ``most`` of the machine busy while times were measured; NaN: an
+    unknown share.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'
@@ -88,7 +88,7 @@ def listed(names: list[str]) -> str:
 
 
 def title_of(name: str) -> str:
-    """A statistic of a metric, or anything else by its name, in words.
+    """The name of a statistic of a metric, or any other name, in words.
 
     >>> title_of("surface_deviation.rms"), title_of("unknowns")
     ('surface deviation, rms', 'unknowns')

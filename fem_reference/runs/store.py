@@ -238,7 +238,7 @@ def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floa
     """Raise InputError where a frame has another number of points than the run at rest."""
     for name, points in zip(names, frames, strict=True):
         if len(points) != len(rest):
-            raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as the rest of the run has")
+            raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as in the rest of the run")
 
 
 def status(folder: Path) -> str:

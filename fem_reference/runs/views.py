@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.joining import called
-from fem_reference.problems.muscles import MusclesProblem, Span
+from fem_reference.problems.joining import Span, called
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Frame, Run
 
 # Scalars of all muscles together, which are left out for a single one.

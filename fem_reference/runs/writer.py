@@ -74,7 +74,7 @@ def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
 
 
 def pass_on(folder: Path, to: Path) -> None:
-    """Let the run in the folder ``to`` continue from the stored part of that in ``folder``, unless it has its own."""
+    """Copy the stored part of the run in ``folder`` to the folder ``to``, unless that exists, for a run that continues from it."""
     if (folder / RESTART).is_dir() and not to.exists():
         with tempfile.TemporaryDirectory(dir=to.parent) as new:
             copy = shutil.copytree(folder, Path(new) / to.name)
@@ -150,7 +150,9 @@ class Writer:
             write(self.folder / names[-1][1])
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
-            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # for effects added since
+            unknown: list[float | None] = [None] * (
+                len(self.state["numbers"]) - 1
+            )  # in frames before an effect was added
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)

@@ -60,11 +60,10 @@ class Candidate(SolverChoice):
 
 
 class Expectation(Record):
-    """A number that a measure of this case must have.
+    """A ``truth`` that a measure of this case must meet ``within`` a tolerance.
 
-    ``of`` is ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic`` may be left out where the
-    metric has one only; ``frame`` a number or ``"any"``; ``truth`` and ``within`` text with a unit, or numbers where the metric
-    has none.
+    ``of``: ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic``: optional if the metric has
+    only one; ``frame``: a number or ``"any"``; ``truth`` and ``within``: text with a unit, or numbers if the metric has no unit.
     """
 
     of: str
@@ -185,7 +184,7 @@ class Case(Record):
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
         folders = [self.folder, HOME / "meshes", *map(Path, filter(None, settings.split(os.pathsep)))]
         if not any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
-            want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
+            want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER for another folder"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     def check_solvers(self) -> None:

@@ -57,8 +57,8 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres between those on the muscle's surface: three or more around each of its ``heads``, by file; or, where no file has
-    any, lines of the Laplace field just below the surface, ``around`` the muscle.
+    """Fibres interpolated between those on the muscle's surface. ``heads``: a file for each head, with three or more fibres around
+    it. ``around``: lines of the Laplace field just below the surface, if there is no file.
     """
 
     count: int = Field(gt=0, le=1000)

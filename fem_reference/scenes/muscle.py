@@ -104,7 +104,7 @@ class CaseSphere(Record):
 
 
 class Rod(Record):
-    """A capsule or a cylinder: of ``radius`` about the segment from ``start`` to ``end``."""
+    """A capsule or a cylinder of ``radius`` about the segment from ``start`` to ``end``."""
 
     start: Point
     end: Point
@@ -160,8 +160,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle, the size of its tetrahedra, how often each is then cut into eight (``refinements``),
-    and the ``mesher``: good tetrahedra (``"quality"``), or of a box along the axes a grid, each box cut into six (``"block"``).
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
+    ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
     """
 
     surface: str
@@ -172,7 +172,7 @@ class Muscle(Record):
 
 
 class VertexList(Record):
-    """Vertices of the muscle surface from a CSV of ``vertex[,value]`` lines; with ``value`` only the lines that carry it."""
+    """Vertices of the muscle surface from a CSV of ``vertex[,value]`` lines; with ``value`` only the lines with this value."""
 
     file: str
     value: int | None = None
@@ -186,7 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves the clouds alone."""
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves only the clouds."""
 
     file: str
     unit: LengthUnit
@@ -196,7 +196,7 @@ class Outline(Record):
 
 
 class Landmarks(Record):
-    """The middle of a ``cloud`` of landmarks in a file."""
+    """The mean of a ``cloud`` of landmarks in a file."""
 
     file: str
     unit: LengthUnit
@@ -221,8 +221,8 @@ class Attachment(Record):
 
 
 class Frames(Record):
-    """The frame numbers wanted: ``first``, ``first + every``, ... up to ``last``; ``interval`` is the time from a number to the
-    next, needed only where a recorded sequence states times.
+    """The requested frame numbers: ``first``, ``first + every``, ... up to ``last``. ``interval``: the time between two numbers,
+    needed only by ``inertia``, ``damping``, ``viscosity`` and recorded sequences with times.
     """
 
     first: int = Field(ge=0)
@@ -247,7 +247,7 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of a number of the case, by its ``key`` such as ``effect[0].mu``, in place of the one that its effect states."""
+    """The range of a number of the case, by its ``key`` such as ``effect[0].mu``; it replaces the range that the effect states."""
 
     key: str
 
@@ -274,7 +274,7 @@ class DrivenCase(Case):
 
 
 class MuscleCase(DrivenCase):
-    """The case of a muscle."""
+    """The case of a muscle. ``effects``: all listed effects act, or, with "auto", only those that the case needs."""
 
     muscle: Muscle
     attachment: tuple[Attachment, ...] = ()

@@ -12,14 +12,14 @@ from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
 
 
 class LengthFromAttachment(Record):
-    """All within a ``length`` of the patch of an attachment, by its ``name``."""
+    """The part within a ``length`` of the patch of an attachment, by its ``name``."""
 
     name: str
     length: PositiveLength
 
 
 class DepthBelowPatch(Record):
-    """All within a ``depth`` of the triangles in a file."""
+    """The part within a ``depth`` of the triangles in a file."""
 
     file: str
     unit: LengthUnit
@@ -27,14 +27,14 @@ class DepthBelowPatch(Record):
 
 
 class ClosedSurface(Record):
-    """All inside a closed triangle surface in a file."""
+    """The part inside a closed triangle surface in a file."""
 
     file: str
     unit: LengthUnit
 
 
 class LabelledTets(Record):
-    """All inside the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
+    """The part inside those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
 
     file: str
     unit: LengthUnit
@@ -43,7 +43,7 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """The part in which the Laplace field that is 0 on the attachment ``start`` and 1 on ``end`` is from ``first`` to ``last``."""
+    """The part with values ``first`` to ``last`` of the Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
 
     start: str
     end: str

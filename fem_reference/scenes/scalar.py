@@ -10,9 +10,13 @@ from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record, increasing, one_of
 from fem_reference.scenes.case import Case, Standard
 
+_Nodes = Annotated[
+    tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
+]
+
 
 class Interval(Record):
-    """``count`` nodes from ``start`` to ``end``, both included; where ``seed`` is given, those between are drawn at random."""
+    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` those between are at random positions."""
 
     start: float
     end: float
@@ -27,10 +31,10 @@ class Interval(Record):
 
 
 class MeshFiles(Record):
-    """Triangles as listing 4.5 loads them: comma separated files without a header.
+    """Triangles in the format of listing 4.5: comma separated files without a header.
 
-    ``points``: a row of 2 or 3 coordinates a vertex; ``triangles``: a row of three vertices a triangle, the first vertex of all
-    being 1, or the word ``delaunay`` for a triangulation of points in the plane.
+    ``points``: a row of 2 or 3 coordinates for each vertex; ``triangles``: a row of three vertices, counted from 1, for each
+    triangle, or the word ``delaunay`` for a triangulation of points in the plane.
     """
 
     points: str
@@ -38,7 +42,7 @@ class MeshFiles(Record):
 
 
 class SurfaceFile(Record):
-    """A triangle surface in a mesh file, its coordinates times ``scale``."""
+    """A triangle surface in a mesh file; its coordinates are multiplied by ``scale``."""
 
     file: str
     scale: float = Field(gt=0)
@@ -48,12 +52,7 @@ class Domain(Record):
     """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
-    nodes: (
-        Annotated[
-            tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
-        ]
-        | None
-    ) = None
+    nodes: _Nodes | None = None
     mesh: MeshFiles | None = None
     surface: SurfaceFile | None = None
 
@@ -61,12 +60,12 @@ class Domain(Record):
 
 
 class Boundary(Record):
-    """A condition, in one of two forms.
+    """A boundary condition, in one of two forms.
 
-    ``on`` an end of an interval or the ``rim`` of triangles, there only ``where`` a formula is above zero at every vertex of a
-    facet (an edge counts only with both its ends): the ``value`` of the field (Dirichlet) or its ``slope`` along the outward
-    normal (Neumann). Or ``bounds``, a file as listing 4.5 loads it: a row of vertices, the first of all being 1, and a row of the
-    values that they are fixed at. What no condition names has slope 0.
+    The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
+    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets with a value above zero at every vertex.
+    The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
+    values. The slope is 0 on the rest of the boundary.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -88,7 +87,7 @@ class Boundary(Record):
 
 class Element(Record):
     """Lagrange elements of ``order`` 1 or 2, and the ``form``: plain ``galerkin``; ``supg``, stabilised along the flow; or
-    ``auto``, which is supg where the mesh Peclet number is above 1 anywhere, else galerkin.
+    ``auto``, which is supg if the mesh Peclet number is above 1 anywhere, and galerkin otherwise.
     """
 
     order: Literal[1, 2]
@@ -96,7 +95,7 @@ class Element(Record):
 
 
 class ScalarCase(Case):
-    """The case of a scalar field; ``exact`` is its solution where that is known."""
+    """The case of a scalar field; ``exact`` is its solution, if known."""
 
     domain: Domain
     boundary: tuple[Boundary, ...] = ()

@@ -27,7 +27,7 @@ def names(task: Task | None = None) -> list[str]:
 
 
 def offers(name: str) -> tuple[Solver[Any, Any], ...]:
-    """The offers of the solver ``name``, one entry a task; TypeError where its file does not say."""
+    """The offers of the solver ``name``, one for each task; TypeError where its file has no valid ``SOLVES``."""
     found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
     if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
         want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
@@ -66,8 +66,8 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and the settings for a solver, or a candidate, of a ``name``: those of the case's own candidate, else those
-    of the page table-5-1, else the solver's defaults.
+    """The name of a run and the settings for ``name``, a solver or a candidate: those of the case's own candidate, else of the page
+    table-5-1, else the solver's defaults.
     """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]

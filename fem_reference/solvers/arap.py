@@ -1,10 +1,10 @@
 """ARAP, as rigid as possible: the edges around every vertex keep their shape. Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state after the bones took their pose of frame n. Attached vertices move with their bone exactly. From the
-state before, the method alternates between the rotations of all cells (local step) and the positions of all other vertices (global
+Frame number n is the state with the bones in their pose of frame n. Attached vertices move with their bone exactly. From the
+previous state, the method alternates between the rotations of all cells (local step) and the positions of free vertices (global
 step). Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
 over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still that of
-linear elements, which is positive. Attachments by springs are exact here, and there is no contact.
+linear elements, which is positive. Attachments by springs are rigid here, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -31,22 +31,22 @@ Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
 Fixed = Literal["remove", "ols"]
 
-# A triangle whose height is this share of its longest side or less has no area.
+# A triangle counts as degenerate if its height is at most this share of its longest side.
 _NO_AREA = 1e-6
 
 
 class ArapSettings(Record):
     """The settings of the alternation; every key but ``tolerance`` is required.
 
-    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (the same, the negative ones 0), "kirchhoff" (all 1),
-    "tutte" (those, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge are
-    together more than pi. Kept, as libigl keeps them, such weights let a cell gain from a half turn, so that rest may not stay.
-    ``fixed``: the rows and columns of attached vertices are left out ("remove"), or the columns alone, and all rows are met by
-    least squares ("ols", eq. 5.12). With removed rows tutte has the states of kirchhoff.
-    ``rotations``: fitted before "each" global step, or once in a frame ("first only"): its later iterations then change nothing.
+    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative ones set to 0), "kirchhoff" (all 1), "tutte"
+    (kirchhoff, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge sum to more
+    than pi. If such weights are kept, as in libigl, a half turn of a cell may lower the energy, so that rest is unstable.
+    ``fixed``: the rows and columns of attached vertices are removed ("remove"), or only the columns, and all rows are solved by
+    least squares ("ols", eq. 5.12). With removed rows, tutte gives the same states as kirchhoff.
+    ``rotations``: fitted before "each" global step, or once in a frame ("first only"): later iterations then change nothing.
     ``volume_step``: after each global step the free vertices are scaled about the mean of all by eq. 5.9.
-    ``iterations``: in each frame; their number is the method. With a ``tolerance`` [mm] a frame is done as soon as no vertex moved
-    by more in an iteration, and the run is out of steps where a frame is not done after so many.
+    ``iterations``: in each frame; without a ``tolerance`` their number determines the result. With a ``tolerance`` [mm] a frame
+    ends as soon as no vertex moves farther in an iteration; a run with a frame that needs more iterations is out of steps.
     """
 
     weights: Weights
@@ -65,7 +65,7 @@ def cells_of(surface: Surface, weights: Weights) -> VertexCells:
 
 
 def laplacian(cells: VertexCells) -> Any:
-    """The sparse matrix L (n, n) of which ``L p' = b``: minus that of the report's Figure 5.5."""
+    """The sparse matrix L (n, n) of ``L p' = b``: minus the matrix of the report's Figure 5.5."""
     count = len(cells.rest)
     matrix = sparse.csr_array((cells.weights, cells.neighbours, cells.starts), shape=(count, count))
     return sparse.diags_array(matrix.sum(axis=1)) - matrix
@@ -80,9 +80,9 @@ def least_energy(points: Floats, cells: VertexCells) -> float:
 class GlobalStep:
     """The global step for given ``attached`` (k,) and ``free`` vertices (m,), factorised once.
 
-    ``pick`` (m, n) is what both sides are multiplied with: the rows of free vertices, or for least squares the transpose of their
-    columns. ``coupling`` (m, k) is that of the attached vertices. ``loose`` are free vertices that no weights tie to an attached
-    one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
+    ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
+    columns. ``coupling`` (m, k): the columns of attached vertices, multiplied so. ``loose``: free vertices that no weights connect
+    to an attached one. If there are any, or if nothing or everything is attached, there is no ``factor``: free vertices stay.
     """
 
     cells: VertexCells
@@ -116,9 +116,7 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and the
-    trouble with it, if any.
-    """
+    """The ``points`` (n, 3) [mm] of a frame after ``iterations``, True if these ``met`` the tolerance, if any, and the trouble."""
 
     points: Floats
     iterations: int
@@ -137,7 +135,7 @@ class Alternation(MovingSurface):
         self.cost |= {"local_global_steps": 0, "frames_off_tolerance": 0}
 
     def move(self, number: int) -> None:
-        """Carry the attached vertices there, and relax."""
+        """Carry the attached vertices to frame ``number``, and relax the others."""
         carry(self.points, self.setup, number)
         self.relaxed = self.relax(self.points)
         self.points = self.relaxed.points
@@ -145,7 +143,7 @@ class Alternation(MovingSurface):
         self.cost["frames_off_tolerance"] += not self.relaxed.met
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the surface, or with how it relaxed."""
+        """The trouble with the surface, or with its relaxation."""
         return super().trouble() or self.relaxed.trouble
 
     def frame(self, number: int) -> Frame:
@@ -158,7 +156,7 @@ class Alternation(MovingSurface):
         frames = self.setup.frames[-1] - self.setup.frames[0]
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
-            advice = "more iterations may help; without a tolerance their number is the method"
+            advice = "more iterations or a larger tolerance may help"
             return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
         return Outcome("converged", done)
 
@@ -193,7 +191,7 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
     model = timed(make, setup, settings)
     if len(loose := model.system.loose):
         why = f"vertex {loose[0]}: nothing but triangles without area or weight ties it to an attached vertex"
-        hint = "kirchhoff weights feel no areas"
+        hint = "kirchhoff weights do not depend on areas"
         return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
     return follow(model, setup, sink)
 
@@ -201,9 +199,8 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-        V0 is ``volume`` [mm3]. It is reached where all are free; as attached vertices stay, some of it is missing. A surface that
-        encloses
-    nothing stays as it is.
+    V0 is ``volume`` [mm3]. It is reached if all vertices are free; as attached vertices stay, some of it is missing. A surface that
+    encloses nothing stays as it is.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
     factor = np.cbrt(volume / inside) if inside > 0 else 1.0
@@ -224,7 +221,7 @@ def factorised(matrix: Any) -> Any:
 
 
 def cotangents(points: Floats, triangles: Ints) -> Floats:
-    """Cotangent of the angle at each corner (m, 3), negative where it is obtuse; 0 in a triangle that has no area."""
+    """Cotangent of the angle at each corner (m, 3), negative where it is obtuse; 0 in a degenerate triangle."""
     sides = [points[triangles[:, (k + 2) % 3]] - points[triangles[:, (k + 1) % 3]] for k in range(3)]
     doubled = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
     longest = np.max([np.einsum("ij,ij->i", side, side) for side in sides], axis=0)

@@ -29,7 +29,7 @@ class VertexCells(NamedTuple):
 
 @compiled
 def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
-    """Turn rows and columns p and q of the symmetric ``matrix`` (4, 4) so that [p, q] is 0; columns of ``vectors`` with them."""
+    """Rotate rows and columns p, q of the symmetric ``matrix`` (4, 4) so that [p, q] is 0, and columns p, q of ``vectors`` too."""
     slope = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
     tangent = math.copysign(1.0, slope) / (abs(slope) + math.sqrt(slope * slope + 1))
     c = 1 / math.sqrt(tangent * tangent + 1)
@@ -65,8 +65,8 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
     """The ``rotation`` R (3, 3), det R = 1, for which sum_ab R_ab C_ba is greatest; ``matrix``, ``vectors`` (4, 4) are scratch.
 
     It is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C, read as a quaternion (Horn 1987,
-    doi:10.1364/JOSAA.4.000629): what the report's singular values give, and a rotation where those give a reflection,
-    for cells that are flat or turned inside out.
+    doi:10.1364/JOSAA.4.000629). The report's singular values give the same, except in cells that are flat or inside out, where
+    they give a reflection.
     """
     C = covariance
     matrix[0, 0] = C[0, 0] + C[1, 1] + C[2, 2]
@@ -90,8 +90,8 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
     """The rotation of each cell that takes its edges at rest nearest to those of ``points``, (n, 3, 3).
 
-    The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges from the vertex itself, as in Sorkine and Alexa
-    2007; about the centroids of the report's text the fit would no longer minimise eq. 5.10.
+    The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges start at the vertex itself, as in Sorkine and
+    Alexa 2007; with the centroids of the report's text the fit would no longer minimise eq. 5.10.
     """
     rotations = np.empty((len(points), 3, 3))
     covariance, matrix, vectors = np.empty((3, 3)), np.empty((4, 4)), np.empty((4, 4))

@@ -1,11 +1,10 @@
 """ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
-*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve ``L p' = b +
-lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the positions of the
-iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's: no small change that
-keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles)
-start from the ARAP state of the frame; there are no velocities. Where both are requested, the projections come last. As in
-``arap``, there is no contact.
+*The volume as a constraint* of the ARAP energy, in place of a scaling after each step: the positions of a global step solve
+``L p' = b + lambda grad V``. The gradient is that of the previous iteration, and the multiplier lambda is such that the enclosed
+volume is that of rest. At convergence, the gradient of the energy is a multiple of that of the volume. *ARAP as initial guess*:
+sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame; there are no velocities.
+If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
 
 from typing import Annotated, Self
@@ -25,11 +24,11 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import PbdConstraints, Stiffness, sweep
 from fem_reference.solvers.pbd_kernels import volume
 
-# The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
+# Newton's method for the volume stops at this relative error, or after this many steps.
 _REACHED, _STEPS = 1e-12, 20
-# A root whose imaginary part is this share of it or less is a real one, rounded.
+# A root counts as real if its imaginary part is at most this share of it.
 _REAL = 1e-8
-# Beyond this share the volume is not kept.
+# The volume counts as kept up to this relative error.
 _KEPT = 1e-6
 
 
@@ -45,9 +44,8 @@ class Projections(Record):
 class ArapPbdSettings(Record):
     """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
-    ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
-    states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off
-    where the key is omitted.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; Tutte's are not offered, as with removed rows they give the
+    states of kirchhoff. ``volume_constraint``: minimise the energy at the volume of rest. ``projections``: none by default.
     """
 
     weights: Symmetric
@@ -82,10 +80,10 @@ def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
 
 
 def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
-    """Local and global steps from ``points`` (n, 3) until the settings are met, at the volume of ``rest`` where they say so.
+    """Local and global steps from ``points`` (n, 3), as many as the settings demand, at the volume of ``rest`` if they demand it.
 
-    The volume is lost where it is farther from the minimum of a global step than the edge of a cube of that volume: it is kept by
-    a fold then, at another root of the cubic.
+    Diverged where the volume moves a point farther from the minimum of a global step than the edge of a cube of that volume: then
+    only folds keep the volume, at another root of the cubic.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
@@ -105,9 +103,8 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
     """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, and the least such lambda.
 
-    p is the ``minimum`` (n, 3) of the global step and the gradient that at the positions ``before`` it. The volume is a cubic in
-    lambda; of its roots the one nearest to the minimum counts, and Newton's method takes rounding from it. Without one the minimum
-    stays as it is.
+    p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` it. The volume is a cubic
+    in lambda; Newton's method refines its root nearest to 0. Without a root the minimum is returned.
     """
     direction = np.zeros_like(minimum)
     if system.factor is None:
@@ -128,8 +125,8 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
     """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None where there is none.
 
-    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. The greatest
-    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not harm.
+    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. It is solved
+    for ``1 / lambda``, as this stays accurate where the cubic term nearly vanishes.
     """
     (value, slope), (cubic, slope_of_direction) = volume(points, rest.triangles), volume(direction, rest.triangles)
     off = value - rest.six_volumes

@@ -1,10 +1,10 @@
-"""Bones that keep vertices out of them, as constraints ``C = distance - allowed >= 0`` of vertices. Report section 6.1.1.
+"""Contact of vertices with bones, as constraints ``C = distance - allowed >= 0``. Report section 6.1.1.
 
 The distance to a bone is computed only for the vertices that may be near it. A distance changes by at most the displacement, so a
 vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at the
 places that they reach and not on the path there: a sharp edge may pass between them, and a vertex that goes through a thin bone in
-one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest: with the
-whole scene turned, ``pbd`` moves the vertices of the case hip_flexion by up to 1.2 mm, on average by 0.1 mm.
+one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest, so results
+depend on the axes: with the whole scene rotated, vertices of the case hip_flexion by ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
 import math
@@ -20,7 +20,7 @@ from fem_reference.problems.setup import Bone
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 
-# The gradient of a sampled distance is a unit vector but for a few percent.
+# Safety factor on distances: the gradient of a sampled distance has length 1 only within a few percent.
 _SURE = 0.9
 
 Four = tuple[float, float, float, float]
@@ -47,7 +47,7 @@ def _splines(t: float) -> tuple[Four, Four]:
 
 @compiled
 def _cell(place: float, count: int) -> tuple[int, float]:
-    """The cell that a ``place``, counted in cells, lies in, of those that ``count`` nodes have between them, and where in it."""
+    """The index of the cell that contains ``place`` [cells], on an axis of ``count`` nodes, and the position in it, 0 to 1."""
     cell = min(int(place), count - 3)
     return cell, place - cell
 
@@ -96,10 +96,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Those of the ``points`` (n, 3) that have gone ``clear`` (n,) [mm] or more from ``asked_at`` (n, 3), as a bone at ``pose``
-    sees it.
-
-    Their numbers (k,) and where they are in the bone's rest frame (k, 3).
+    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that are ``clear`` (n,) [mm] or more from ``asked_at`` (n, 3), all
+    in the rest frame of a bone at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
@@ -120,8 +118,8 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 class CollidingBone:
     """A bone, the distance that it allows each vertex, and the last known distances.
 
-    A vertex is allowed to come within ``gap`` [mm] of the bone, and no nearer than at rest where it is nearer there: nothing
-    jumps at the first step. Vertices that are not ``free`` (n,) are never checked.
+    A vertex may come as near as ``gap`` [mm], or as near as at rest where that is less, so that nothing jumps at the first step.
+    Vertices that are not ``free`` (n,) are never checked.
     """
 
     def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
@@ -139,7 +137,7 @@ class CollidingBone:
         self.pose = np.array(self.bone.pose(frame), np.float64)
 
     def near(self, points: Floats) -> Contacts:
-        """The constraints of all vertices that may be violated, with ``points`` (n, 3) [mm]."""
+        """The constraints that vertices at ``points`` (n, 3) [mm] may violate."""
         vertices, places = approached(points, self.pose, self.asked_at, self.clear)
         distance, gradient = self._sample(places)
         allowed = self.allowed[vertices]
@@ -161,7 +159,7 @@ class CollidingBone:
 
 
 def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: float) -> list[CollidingBone]:
-    """The ``bones`` that points, at ``rest`` (n, 3) [mm], collide with, but for those ``attached`` (k,)."""
+    """The ``bones`` with which points at ``rest`` (n, 3) [mm] collide, except the ``attached`` ones (k,)."""
     free = np.ones(len(rest), bool)
     free[attached] = False
     return [CollidingBone(bone, rest, free, gap) for bone in bones]

@@ -36,8 +36,8 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
-REFUSED = 77  # the exit status of a program that does not take a scene, as that of a test that Automake skips
-# What a Python of its own executes: a pickled function with the folders.
+REFUSED = 77  # the exit status of a program that does not support a scene, as of a test skipped under Automake
+# The code of a separate Python process: call a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
 
@@ -45,10 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command, and the value of each setting in it.
 
-    ``unit``: the unit of length of its frames, by default what a ``candidate.toml`` beside them says, else mm. ``version``: of the
-    program. ``files``: files and folders that determine its results beside those that the command names. ``moves``: the carrier
-    of its unknowns. ``time_limit``: processor time after which it is ended. ``directory``: where it runs. ``ladder``: useful
-    values of settings, from the fastest to the most accurate.
+    ``unit``: the unit of length of its frames, by default that of a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    that of the program. ``files``: further files and folders that determine its results, besides those in the command. ``moves``:
+    the mesh with its unknowns. ``time_limit``: the limit of processor time. ``directory``: its working directory. ``ladder``:
+    useful values of settings, from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())
@@ -78,8 +78,8 @@ class CommandSettings(Record):
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The program, the files that words of the command name, also behind a ``=`` and by values of settings, with a Python file all
-    those beside and below it, and ``files``.
+    """The program; files that the command names, also after ``=`` and by values of settings; for a Python file, all Python files
+    in its folder and below; and ``files``.
     """
     directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
@@ -104,8 +104,8 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` beside a program. Its ``law``, an effect, acts on linear tetrahedra, with a Poisson's
-    ratio of at most its setting ``poisson``, beside the effects that it ``takes``.
+    """The contents of ``candidate.toml`` beside a program. ``law``: the effect that is its material, on linear tetrahedra with a
+    Poisson's ratio of at most its setting ``poisson``; ``takes``: further effects that it models.
     """
 
     settings: dict[str, Value] = Field(default_factory=dict)
@@ -118,8 +118,8 @@ class Description(recorded.About):
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
-    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. The ``candidate.toml`` beside
-    the first file that it names and that has one describes it, else the one in the directory.
+    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. It is described by the
+    ``candidate.toml`` beside the first of its files that has one, else by that in the directory.
     """
     names = placeholders(command, place)
     _check_program(command, directory, place)
@@ -141,7 +141,7 @@ def choice(command: str, directory: Path, place: str) -> Candidate:
 
 
 def of_function(function: Callable[..., None], given: Mapping[str, Any], folder: Path) -> SolverChoice:
-    """The command that calls ``function(scene, out, **settings)`` in a Python of its own; ``given``: its settings, and keys of
+    """The command that calls ``function(scene, out, **settings)`` in another Python; ``given``: its settings, and keys of
     :class:`CommandSettings`. The function, with the values, is written into a ``folder``.
     """
     own = {key: value for key, value in given.items() if key in CommandSettings.model_fields}
@@ -160,7 +160,7 @@ def of_function(function: Callable[..., None], given: Mapping[str, Any], folder:
 
 
 def placeholders(command: str, place: str) -> tuple[str, ...]:
-    """The settings in a ``command``; InputError where it cannot be split, lacks a folder, or has braces around no name."""
+    """The settings in a ``command``; InputError where it cannot be split, lacks a folder, or has braces without a name."""
     where = join(place, "command")
     try:
         words = shlex.split(command)
@@ -191,7 +191,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
     """The offer, whose settings are those that the command mentions."""
 
     def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
-        """The record with a required key for each setting in the command, which is a trade where it has a ladder."""
+        """The record with a required key for each setting in the command; one with a ladder is marked as ``Trade``."""
         command, ladder = given.get("command"), given.get("ladder", {})
         if not isinstance(command, str) or not isinstance(ladder, Mapping):
             return self.settings  # which says what is wrong
@@ -244,7 +244,11 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     """The outcome of a program that ``ended``, and its frames up to the first missing or damaged one; InputError if it refused."""
     if ended.code == REFUSED:
         raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program takes")
-    kept, lacks, trouble, cost = 0, "", None, _cost(problem, settings, ended)
+    free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
+    unknowns = 3.0 * (free if settings.moves == "surface" else len(problem.mesh.points))
+    cost = {"seconds": ended.seconds, "seconds_solve": ended.seconds, "seconds_processor": ended.processor}
+    cost |= {"peak_memory_mb": ended.memory, "unknowns": unknowns}
+    kept, lacks, trouble = 0, "", None
     try:
         said = recorded.checked_about(out, settings.unit)
         unit, lacks = settings.unit or length_unit(said.unit or "mm"), said.lacks
@@ -270,16 +274,8 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
     return Outcome("converged", f"{kept} frames in {took}{lacks}", cost)
 
 
-def _cost(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended) -> dict[str, float]:
-    """The measured cost, with start, reading and writing; unknowns are the coordinates of what it moves."""
-    free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
-    count = free if settings.moves == "surface" else len(problem.mesh.points)
-    used = {"seconds_processor": ended.processor, "peak_memory_mb": ended.memory, "unknowns": 3.0 * count}
-    return {"seconds": ended.seconds, "seconds_solve": ended.seconds} | used
-
-
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The time that the program states for its frames alone; InputError where that is more than it took in all."""
+    """The time that the program states for its frames alone; InputError where that exceeds its run time."""
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

@@ -11,7 +11,7 @@ import platformdirs
 
 
 class _Compiled:
-    """A function as machine code, which is made, and numba imported, when it is called or another one that calls it is compiled."""
+    """A function that numba compiles when it, or a compiled function that calls it, is first called; numba is imported then."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
@@ -26,7 +26,7 @@ class _Compiled:
 
     @cached_property
     def machine_code(self) -> Any:
-        """Its function of numba."""
+        """The function that numba has compiled."""
         import numba
 
         if not can_keep(kept_code()):
@@ -46,7 +46,7 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
 
 @cache
 def can_keep(folder: Path) -> bool:
-    """True where files can be written in a folder, which is made; a user without a home has none."""
+    """True where files can be written in a folder, which is created; False for a relative one, as of a user without a home."""
     if not folder.is_absolute():
         return False
     try:

@@ -2,7 +2,7 @@
 
 Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest. Between two fixed
 points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A line
-goes around an obstacle on the shorter side: where its ends turn beyond opposite points, it changes sides.
+goes around an obstacle on the shorter side: once its ends pass opposite points, it changes sides.
 """
 
 from typing import Annotated, Self
@@ -30,9 +30,9 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 class LineSettings(Record):
     """Points and obstacles that lines go through and around; without any key they are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``via_count``: so many points instead, evenly
-    spread over each fibre, each on the bone of the nearer end. ``obstacle``: what every part of a line goes around, from one
-    fixed point to the next, where the straight path would cross it. ``hill``: their forces.
+    ``via``: points in the order in which a fibre passes them. ``via_count``: instead, a number of points evenly spread over each
+    fibre, each on the bone of the nearer end. ``obstacle``: surfaces that each segment between two fixed points goes around,
+    where the straight path would cross them. ``hill``: forces of the lines.
     """
 
     via: tuple[Via, ...] = ()
@@ -101,7 +101,7 @@ class Shortest:
         return self.found
 
     def ending(self) -> Outcome:
-        """Converged, as every line is; the points and obstacles of the lines."""
+        """Converged; the message states via-points and obstacles."""
         kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
         around = f" or around {self.wraps}" if self.wraps.given else ""
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
@@ -118,7 +118,7 @@ def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
 
 
 def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wraps]:
-    """The lines and the obstacles; InputError below ``place`` where the case has not what they need, or a fixed point is inside an
+    """The lines and the obstacles; InputError below ``place`` where the case lacks what they need, or a fixed point is inside an
     obstacle at the first frame.
     """
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]

@@ -26,7 +26,7 @@ SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """``peclet``: the argument of listing 4.1, by default 1 as in its head; listing 4.5 has none."""
+    """``peclet``: the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
 
     peclet: float | None = Field(default=None, gt=0)
 
@@ -55,8 +55,8 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request: of
-    conditions listing 4.1 has 0 at the first node and slope -1 at the last, listing 4.5 values only.
+    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request. Listing
+    4.1 has the conditions 0 at the first node and slope -1 at the last; listing 4.5 has values only.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:
@@ -75,7 +75,7 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
 
     ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``: it
     solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1), for any nodes, at the nodes, without error:
-    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. Nothing in it is advection.
+    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. It contains no advection.
     """
     steps = np.diff(nodes)
     if len(steps) == 0 or not (steps > 0).all():
@@ -95,7 +95,7 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
     """Listing 4.2: the sparse matrix A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim), dim by dim for each vertex.
 
     For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and taken from the
-    two blocks between them. No derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
+    two blocks between them. A is no derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
     springs along the edges, all of one stiffness whatever their length, w = 2 inside and 1 at the rim.
     """
     dim = points.shape[1]
@@ -120,7 +120,7 @@ def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]
     """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
 
     Their columns go to the right side, their rows and columns become those of the unit matrix. A vertex named twice is
-    refused: the listing would take the first value to the neighbours and the last to the vertex.
+    refused: the listing would use its first value for the neighbours and its last for the vertex.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):
@@ -144,8 +144,8 @@ def right_side(points: Floats) -> Floats:
 
 
 def fem2d(triangles: Ints, points: Floats, bounds: Floats) -> tuple[Floats, Floats]:
-    """Listing 4.5 over ``triangles`` (m, 3) of ``points`` (n, 2 or 3): its x (n,), and the vector unknown (n, dim) that x is the
-    norm of. What the listing draws is -x.
+    """Listing 4.5 over ``triangles`` (m, 3) of ``points`` (n, 2 or 3): its x (n,), and the vector unknown (n, dim) whose norm
+    is x. The listing draws -x.
 
     ``(26 A A + 2 A + 0.05) u = b`` with A of listing 4.2, positive semidefinite, on the side of minus a second derivative: of order
     4, 2 and 0, where the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` is of order 2, 1 and 0.

@@ -27,17 +27,17 @@ from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
-# Where no time step is asked for, it is this share of the greatest that is stable.
+# The default time step over the greatest stable one.
 SHARE_OF_STABLE = 0.9
-# A run with more steps than this for each frame number is refused: on 3,000 tetrahedra they take two seconds a frame number.
+# A run with more steps for each frame number is refused: on 3,000 tetrahedra a frame number would take two seconds.
 _MOST_STEPS = 100_000
-# Compiled code is asked for so many steps at once: only in between can the user interrupt.
+# Time steps in one call of compiled code: the user can interrupt only between calls.
 _AT_ONCE = 200
 _REPORT = "eq. 5.5"
 
 
 def _damping(text: object) -> float | str:
-    """A damping coefficient [N s/mm], or the report's as it is."""
+    """A damping coefficient [N s/mm], or ``"eq. 5.5"``."""
     if text == _REPORT:
         return _REPORT
     try:
@@ -47,15 +47,14 @@ def _damping(text: object) -> float | str:
 
 
 class MassSpringSettings(Record):
-    """Settings of the muscle, its stiffness and mass, and of its time.
+    """Stiffness, mass and time of the muscle.
 
-    ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
-    not depend on them, and a small one would make every time step small.
-    ``frame_time``: the solver's own time from a frame number to the next; the longer it is, the nearer the muscle comes to
-    equilibrium. The scene's interval applies to the reference and to recorded sequences. ``damping``: the
-    coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
-    ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
-    ``time_step``: the longest step wanted; without it one that is stable.
+    ``stiffness``: that of every spring. ``density``: that of the muscle. All masses are equal: equilibrium does not depend on
+    them, and a small one would make every time step small. ``frame_time``: the solver's own time from a frame number to the next;
+    the longer it is, the nearer the muscle comes to equilibrium. The scene's interval applies to the reference and to recorded
+    sequences. ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an
+    acceleration, by default none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest
+    allowed step, by default a stable one.
     """
 
     stiffness: Stiffness
@@ -97,10 +96,10 @@ def report_damping(mass: float, stiffness: float) -> float:
 def stable_time_step(network: Network, fixed: Ints) -> float:
     """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
 
-    A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. Of springs
-    that is at most ``2 n_i k`` of mass i with n_i springs, stretched or not, so each mass has a limit, and the least counts. The
-    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, which takes no difference of great numbers. For c = 0 it is 2 / omega
-    with omega^2 = 2 n k / m, which two masses on one spring reach.
+    A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i
+    with n_i springs, stretched or not, k is at most ``2 n_i`` times that of a spring; the least limit of all masses counts. The
+    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with
+    omega^2 = 2 n k / m, the exact limit of two masses on one spring.
     """
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
@@ -153,7 +152,7 @@ class MassSpringModel:
         self.cost["time_steps"] += self.steps
 
     def carried(self, number: int) -> Floats:
-        """The masses (n, 3) [mm] at rest, but attached ones where they are at frame ``number``."""
+        """The positions (n, 3) [mm] of free masses at rest and of attached ones at frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
@@ -166,8 +165,7 @@ class MassSpringModel:
     def frame(self, number: int) -> Frame:
         """Surface and fibres as the masses carry them; attached vertices move with their bones.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, how many are inside
-        out.
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, their number.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = self.points - mesh.points
@@ -184,7 +182,7 @@ class MassSpringModel:
         return int((tet_volumes(self.points, self.problem.mesh.tets) <= 0).sum())
 
     def ending(self) -> Outcome:
-        """Converged, as every step is; how many tetrahedra are inside out in the end, and whether the scene has another clock."""
+        """Converged; the message counts inverted tetrahedra and notes a ``frame_time`` that differs from the scene's interval."""
         frames, count, tets = self.problem.frames, self._inverted(), len(self.problem.mesh.tets)
         done = f"{frames[-1] - frames[0]} frame numbers of {self.steps} steps of {self.time_step:.3g} s"
         note = f"; {count} of {tets} tetrahedra are inside out at the last frame" if count else ""

@@ -1,10 +1,9 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
-Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every sub-iteration is a
-full step of the algorithm. No external force acts, so the time step cancels: in place of velocities the displacements of vertices
-in one sub-iteration, ``dt v``, are stored, and there is no time step to set. As in the report, the result depends on the order of
-the vertices, since constraints are projected one after the other. Collisions are found again in every sweep; line 13 finds them
-once.
+Frame number n is the state after iteration n. In an iteration the bones first take their pose; then every sub-iteration is a full
+step of the algorithm. No external force acts, so the time step cancels and is no setting: ``dt v``, the displacements of vertices
+in one sub-iteration, are stored in place of velocities. As in the report, the result depends on the order of the vertices, since
+constraints are projected one after the other. Collisions are found anew in every sweep; line 13 finds them once.
 """
 
 from collections.abc import Sequence
@@ -25,13 +24,13 @@ from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
-# Segments whose distances differ by less than this share of the size of the muscle are as near.
+# Segments count as equally near if their distances differ by less than this share of the size of the muscle.
 _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
-    ``stiffness``, the share of the displacement out of a bone that one projection makes.
+    """Contact of bones with free vertices. ``gap`` [mm]: how near vertices may come, or as near as they are at rest;
+    ``stiffness``: the share of the displacement out of a bone that one projection makes.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -41,13 +40,13 @@ class PbdCollision(Record):
 class PbdSettings(Record):
     """The settings of the algorithm; every key is required but those that turn an effect on.
 
-    ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over
-    all constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8), 0 for
-    none. ``stretch``, ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles, the
-    share of its error that one projection of a constraint takes away, from 0 (constraint off) to 1.
+    ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over all
+    constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8). ``stretch``,
+    ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles: the share of its error that one
+    projection of a constraint removes, from 0 (constraint off) to 1.
 
-    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)`` of their angle to the nearest fibre, both at rest;
-    1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
+    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; 1 in the
+    report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -64,8 +63,8 @@ class PbdSettings(Record):
 class PbdConstraints:
     """The constraints that keep a surface at its rest state.
 
-    ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
-    times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
+    ``lengths`` (e,) [mm] of ``edges`` (e, 2), and ``share`` (e,), a factor on the stiffness of each; ``six_volumes`` [mm3],
+    six times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
     edge. ``inverse_masses`` (n,): 0 for an attached vertex, 1 for every other.
     """
 
@@ -85,8 +84,8 @@ class PbdConstraints:
 
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
-        """The constraints of a closed surface whose vertices ``attached`` (k,) are attached; all edges are as stiff."""
-        points, triangles = np.array(points), np.array(triangles)  # the compiled functions know writable arrays only
+        """The constraints of a closed surface with ``attached`` vertices (k,); all edges are equally stiff."""
+        points, triangles = np.array(points), np.array(triangles)  # compiled functions accept writable arrays only
         inverse_masses = np.ones(len(points))
         inverse_masses[attached] = 0
         hinges = hinges_of(triangles)
@@ -114,7 +113,7 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle.
 
-    Where two segments of fibres are equally near up to rounding, as at a kink, the first counts: turning the scene changes nothing.
+    Of two segments that are equally near up to rounding, as at a kink, the first counts, even if the scene is rotated.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]

@@ -22,8 +22,8 @@ Vector = tuple[float, float, float]
 
 # Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
 FLAT = 1e-5
-# One projection turns a pair by no more than this [rad]. Points go straight, not round: a turn by t makes a triangle
-# higher by t^2 / 2; where pairs are folded shut (t near pi) that grows from pair to pair until all is lost.
+# One projection turns a pair by no more than this [rad]. Points move along lines, not arcs: a turn by t lengthens a triangle
+# by the share t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -80,8 +80,8 @@ def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
 def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
     """Six times the volume inside closed ``triangles`` (m, 3) [mm3] and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
 
-    Eq. 5.18 drops its 1/6 halfway; here value and gradient both are without it. The origin is the mean of the points,
-    which a closed surface does not feel but rounding does.
+    Eq. 5.18 drops its 1/6 halfway; here value and gradient both lack it. The origin is the mean of the points: this does not
+    change the volume of a closed surface, and reduces rounding.
     """
     centre = (points[:, 0].mean(), points[:, 1].mean(), points[:, 2].mean())
     gradient = np.zeros_like(points)

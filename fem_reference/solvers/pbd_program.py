@@ -3,8 +3,8 @@
 The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
 
 - edges: each is projected twice in a sweep, as a half-edge of either triangle, vertex by vertex (text: one constraint)
-- attached vertices weigh as much as all others and are put back after each step, so that what they take of a correction is
-  lost (text: their w is 0, line 2)
+- attached vertices weigh as much as all others and are put back after each step, so that their share of a correction is lost
+  (text: their w is 0, line 2)
 - volume: its change is divided by 6 and its gradient is not, which takes away a sixth of the error in a step (text:
   eq. 5.18 to 5.21 drop the 6 in both)
 - folds: opened where they are sharper than at rest, never closed, and left where they are nearly flat or the correction
@@ -15,9 +15,9 @@ The program (github.com/cervenkam/muscle-deformation-PBD) departs from the repor
   force it cancels
 - collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a
   flood from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after
-  step, even once the bone rests; one that comes inside is moved back by steps of a voxel; of two bones the later one wins. Voxels
-  lie along the axes at rest, and one voxel decides where a vertex goes: with the whole scene turned, vertices of the case
-  hip_flexion end up to 57 mm elsewhere (4.5 mm on average; without voxels 1e-8 mm)
+  step, even once the bone rests; one that enters is moved back by steps of a voxel; of two bones the later one wins. Voxels
+  lie along the axes at rest, and one voxel decides where a vertex goes: with the whole scene rotated, vertices of the case
+  hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
@@ -28,7 +28,7 @@ it, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -marc
 50). For the same reason a bone's pose is here the product of its motions, and the angle of flat pairs at rest is off by 2e-8 rad.
 
 Two things differ from the program: the scene defines the attached vertices (there: all vertices in the voxels of a bone at rest),
-and fibres have their own direction (there: one between points that are not all theirs).
+and a fibre's direction follows its own points (there: points of several fibres).
 """
 
 from collections.abc import Sequence
@@ -50,19 +50,20 @@ from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import PbdConstraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances
 
-# The step of time [s]. It cancels but for rounding.
+# The time step [s]. It cancels but for rounding.
 STEP = 1e-3
-# To so many digits after the point the motion between two poses is known; 90 mm in 100 iterations are 0.9 mm in each.
+# Decimal places of the motion between two poses, so that 90 mm in 100 iterations are exactly 0.9 mm in each.
 DIGITS = 12
 
 
 class ProgramSettings(Record):
     """The settings of the program; every key is required but those that turn an effect on.
 
-    ``sub_iterations``: steps in each iteration, 3 in report 6.1. ``damping``: share of every velocity that is lost in a
-    step, 0.01 in the program. ``bending``: factor of the correction of a fold, 0.9 there. ``voxels``: how many, along each
-    side of its box, a bone is made of, 64 there; without it nothing collides. ``anisotropy``: the stiffness of an edge is
-    1 - |cos| of its angle to the nearest fibre to this power, 1 there; without it, as there without fibres, it is 1.
+    ``sub_iterations``: steps in each iteration, 3 in report 6.1. ``damping``: share of every velocity that is lost in a step,
+    0.01 in the program. ``bending``: factor of the correction of a dihedral angle, 0.9 in the program. ``voxels``: their number
+    along each side of a bone's box, 64 in the program; without it there is no contact. ``anisotropy`` a: the stiffness of an edge
+    is (1 - |cos|)^a of its angle to the nearest fibre, a = 1 in the program; without the key the stiffness is 1, as in the
+    program without fibres.
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -74,7 +75,7 @@ class ProgramSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """A box of k^3 voxels: which are ``inside`` a bone (k, k, k), its ``lower`` corner (3,) and their ``size`` (3,) [mm]."""
+    """A box of k^3 voxels: a mask (k, k, k) of those ``inside`` a bone, its ``lower`` corner (3,), and their ``size`` (3,) [mm]."""
 
     inside: NDArray[np.bool_]
     lower: Floats
@@ -99,9 +100,9 @@ class Voxels:
 
 
 class VoxelBone:
-    """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion that was one; both 4 x 4.
+    """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion other than none; both 4 x 4.
 
-    The pose is the product of all motions, as there, and not the one ``given``: they differ by rounding.
+    The pose is the product of all motions, as in the program; it differs from the ``given`` one by rounding.
     """
 
     def __init__(self, body: Bone, count: int, frame: int) -> None:
@@ -117,7 +118,7 @@ class VoxelBone:
             self.given, self.pose = given, self.last @ self.pose
 
     def move_out(self, reached: Floats, starts: Floats, goals: Floats) -> None:
-        """Correct where vertices that go from ``starts`` (n, 3) to ``goals`` (n, 3) [mm] come to be: ``reached`` (n, 3)."""
+        """Correct, in place, the positions ``reached`` (n, 3) [mm] of vertices on their way from ``starts`` to ``goals`` (n, 3)."""
         back, voxels = np.linalg.inv(self.pose), self.voxels
         before, after = apply(back, starts), apply(back, goals)
         first, last = voxels.places(before), voxels.places(after)
@@ -209,7 +210,7 @@ def project(points: Floats, at: PbdConstraints, bending: float) -> None:
 
 
 def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Floats:
-    """The places (n, 3) [mm] that vertices reach which go from ``starts`` to ``goals`` (n, 3) among ``bones``."""
+    """The positions (n, 3) [mm] that vertices on their way from ``starts`` to ``goals`` (n, 3) reach among ``bones``."""
     reached = goals.copy()
     for bone in bones:
         bone.move_out(reached, starts, goals)
@@ -218,7 +219,7 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Float
 
 _EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
 
-# The report's program as it is, its settings.
+# The settings of the report's program.
 _TABLE = TableRow("PBD", "pbd_program", {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64})
 SOLVES = (
     MuscleSolver(

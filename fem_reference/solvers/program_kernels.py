@@ -109,7 +109,7 @@ def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, 
     """Cosine of the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, that belong to 0, e, a
     and b: minus its gradients [1/mm], at e plus.
 
-    For the last component at e the compiler takes sizes of the normals that it adds up in another order.
+    For the last component at e the compiler sums the norms of the normals in another order.
     """
     u1, u2 = cross(e, a), cross(e, b)
     r1 = 1 / math.sqrt((u1[2] * u1[2] + u1[0] * u1[0]) + u1[1] * u1[1])
@@ -205,7 +205,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) that a flood from the corner (0, 0, 0) gets to, from face to face and not into the ``border``.
+    """The voxels (k, k, k) that a flood from the corner (0, 0, 0) reaches, from face to face and not into the ``border``.
 
     It never goes back to an index of 0.
     """

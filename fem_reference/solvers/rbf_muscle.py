@@ -41,8 +41,8 @@ _PUSHES, _SCALINGS = 4, 3
 
 
 class RbfSettings(Record):
-    """``gaussians``: how many, four parameters each. ``iterations``: local and global steps of a frame number. ``volume``: keep the
-    volume by the radii. ``contact``: avoid bones; off where the key is omitted.
+    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps of a frame number. ``volume``:
+    keep the volume by the radii. ``contact``: avoid bones; by default off.
     """
 
     gaussians: Annotated[int, Field(ge=2), Trade((10, 30, 100))]
@@ -76,7 +76,7 @@ class Cloud:
         cells = VertexCells(nodes, starts, neighbours, np.ones(len(neighbours)))
         system = GlobalStep.of(cells, np.arange(free, count), "remove")
         if len(system.loose):
-            raise InputError("gaussians", f"{free} of which some are tied to no attachment", "more, or fewer")
+            raise InputError("gaussians", f"{free}, some not connected to any attachment", "more, or fewer")
         return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
@@ -105,7 +105,7 @@ class Cloud:
 
 
 class RbfMuscle(MovingSurface):
-    """The muscle at one frame after the other."""
+    """The muscle, moved from frame to frame."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -150,7 +150,7 @@ class RbfMuscle(MovingSurface):
         return np.asarray(turned + self.shares @ shifts)
 
     def _pushes(self, points: Floats, number: int) -> Floats:
-        """The way (n, 3) [mm] of each vertex out of the bone that it is in."""
+        """The displacement (n, 3) [mm] of each vertex out of the bone that it is in."""
         found, free = np.zeros_like(points), np.flatnonzero(self.setup.free)
         for bone in self.setup.bones:
             pose = bone.pose(number)
@@ -168,7 +168,7 @@ class RbfMuscle(MovingSurface):
             points += self.beside[:, None] * (bony - points)[self.nearest]
             carry(points, self.setup, number)  # exactly, however far the surface of the Gaussians was
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
-        if self.settings.volume:  # free vertices give back along its gradient what the radii left over
+        if self.settings.volume:  # free vertices correct the remaining error along its gradient
             six, gradient = volume(points, self.setup.surface.triangles)
             gradient[self.setup.attached_vertices] = 0
             points += gradient * (6 * self.volume - six) / float((gradient**2).sum())
@@ -177,7 +177,7 @@ class RbfMuscle(MovingSurface):
         return points
 
     def ending(self) -> Outcome:
-        """Converged, as every state is found by formulas."""
+        """Converged: a fixed number of steps finds every state."""
         return Outcome("converged", f"{self.settings.gaussians} Gaussians, {4 * self.settings.gaussians} parameters")
 
 

@@ -26,28 +26,28 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-# How far [mm] (rms) the first frame may be from the rest surface without a word: above the rounding of any format.
+# Greatest distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
 AT_REST = 0.1
-# How far (rms), in diagonals of the rest surface's bounding box, it may be at all: above what a solver does to its first
-# frame, below another unit (a tenth of the size is 0.9 of the rms radius away at least, for a ball 0.26 diagonals).
+# Greatest distance at all, in diagonals of the rest surface's bounding box: above the change that solvers make in their first
+# frame, below that of a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a ball).
 NEAR_REST = 0.05
-# How much smaller than at rest a frame may be: no solver folds a body up this far, while cm are 10 and m 1000 mm.
+# Least size of a frame over that at rest: no solver folds a body up this far, but a frame in m is 1/1000 as large as one in mm.
 SMALLEST = 1 / 50
-# How far apart [mm] corners of an STL file that are one vertex may be: three times the spacing of float32 at 500 mm.
+# Greatest distance [mm] between corners of an STL file that are one vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
-# How far, in frames, a time may be from the frame it is of: above rounding to four digits, below any half step.
+# Greatest distance, in frames, of a time from its frame: above rounding to four digits, below any half step.
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
-# What whoever computed a sequence may say of it, in a file beside the frames.
+# The file beside the frames that describes a sequence.
 ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
     """The place of the sequence, and its unit of length.
 
-    ``folder``: a folder with one mesh file a frame, numbered by the last digits of their names; a .pvd or .xdmf file or
-    a folder with one; or the folder of a stored run.
+    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of the name; a .pvd or .xdmf file or a
+    folder with one; or the folder of a stored run.
     """
 
     folder: str
@@ -56,8 +56,8 @@ class RecordedSettings(Record):
 
 class About(Record):
     """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
-    on so many threads, and in words what of the scene was ``left_out``. For standings: the ``group`` of its method, the ``case`` of
-    these frames, the key ``scene`` that its export states, and a ``sha256`` by name of each file, which is checked.
+    on how many threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of its method, the
+    ``case``, the key ``scene`` that its export states, and the ``sha256`` of each file by name, which is checked.
     """
 
     name: FileName | None = None
@@ -86,14 +86,12 @@ class About(Record):
 def about(path: Path) -> About:
     """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; an empty record without one."""
     file = _about_file(path)
-    if not os.path.lexists(file):
-        return About()
-    return parse(About, texts.toml(file), str(file))
+    return parse(About, texts.toml(file), str(file)) if os.path.lexists(file) else About()
 
 
 def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
     """The recorded frames in the folder or file at ``path`` as a candidate, with the name and, without a ``unit``, the unit that
-    their ``candidate.toml`` says; ``place`` is where it was asked for.
+    their ``candidate.toml`` states; ``place`` names the path in messages.
     """
     if not path.exists() or not path.parts:
         raise InputError(place, f'"{path}"', "a folder of frames")
@@ -116,7 +114,7 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Every frame wanted, once all of them are read and known to be of this surface; the cost is that of ``candidate.toml``."""
+    """Pass on every frame wanted, once all are read and checked to be of this surface; the cost is that of ``candidate.toml``."""
     folder = Path(settings.folder)
     said = checked_about(folder, settings.unit)
     frames = list(checked_frames(setup, folder, settings.unit))
@@ -154,7 +152,7 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
 
 
 def checked_about(folder: Path, unit: float | None) -> About:
-    """The ``candidate.toml`` of the sequence; InputError where its unit is another one than ``unit`` [mm]."""
+    """The ``candidate.toml`` of the sequence; InputError where its unit differs from ``unit`` [mm], or a file from its hash."""
     said = about(folder)
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
@@ -177,7 +175,7 @@ def _source(path: Path) -> Path:
             raise InputError(path, f"the sequences {indices[0].name} and {indices[1].name}", "one of them")
         return indices[0] if indices else path
     if path.suffix.lower() not in _INDICES or not path.is_file():
-        raise InputError(path, "none of them", "a folder, or a .pvd or .xdmf file")
+        raise InputError(path, "another kind of file, or nothing", "a folder, or a .pvd or .xdmf file")
     return path
 
 
@@ -186,7 +184,7 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Path | Surface]:
-    """The surfaces by frame number, or the files that they are in."""
+    """The surfaces, or their files, by frame number."""
     entries: Iterable[tuple[int | None, str, Path | Surface]]
     if source.suffix.lower() == ".xdmf":
         steps = files.read_xdmf(source, unit)
@@ -207,7 +205,7 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
 
 
 def _number(time: float, interval: float | None) -> int | None:
-    """The frame number that ``time`` is of, None where it is between two."""
+    """The frame number at ``time``; None where it lies between two frames."""
     number = time if interval is None else time / interval
     return round(number) if math.isfinite(number) and abs(number - round(number)) < ON_FRAME else None
 
@@ -236,7 +234,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True for those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
+    """True (m,) for ``triangles`` (m, 3) that occur more often than among ``rest`` (m, 3), whichever corner comes first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -265,14 +263,14 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
 
 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
-    """InputError where the first frame is grossly elsewhere than ``rest``, a warning where it is not quite there."""
+    """Raise InputError where the first frame is far from ``rest``; warn where it is slightly off."""
     away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
     limit = NEAR_REST * diagonal(rest.points)
     got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"
     if not away <= limit:
         raise InputError(place, got, f"at most {limit:.3g} mm; the usual reason is another unit or another mesh")
     if away > AT_REST:
-        log.warning("%s: %s, which goes into what is measured", place, got)
+        log.warning("%s: %s, which adds to every measure", place, got)
 
 
 SOLVES = (

@@ -35,7 +35,7 @@ class PrescribedPath(NamedTuple):
 
 @compiled
 def forces(points: Floats, network: Network) -> Floats:
-    """The forces (n, 3) [N] on each mass but damping: its weight and its springs.
+    """The forces (n, 3) [N] on each mass, without damping: its weight and those of its springs.
 
     A spring from mass i pulls with ``k (l - L) (x_j - x_i) / l``: F_ij of eq. 5.3 is minus that, since eq. 5.4 has it on the
     left; where both ends coincide it has no direction and does not pull.

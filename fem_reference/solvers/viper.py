@@ -4,9 +4,9 @@ Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each a
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
 stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
 
-Each fibre of the case is a rod, which bends and twists at the bones nearest to its ends as between its segments. There is neither
-mass nor time: a frame number begins with the state before, moved by a blend of the bones. Stiffnesses are shares of an error, as
-in ``pbd``, so the answer depends on iterations. Every rod has one radius at rest, such that all together have the muscle's volume.
+Each fibre of the case is a rod. The bones nearest to its ends act on bend and twist like neighbouring segments. There is neither
+mass nor time: a frame number begins with the previous state, moved by a blend of the bones. Stiffnesses are shares of an error, as
+in ``pbd``, so the answer depends on iterations. All rods have the same radius at rest, such that they fill the muscle's volume.
 Only rods keep their volume; the surface that they carry may not.
 """
 
@@ -35,9 +35,9 @@ _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """``points``: of each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``, ``bending``,
-    ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods keep their
-    radius away from bones, or what they have at rest, and the surface leaves bones; off where the key is omitted.
+    """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
+    ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
+    keep a distance of their radius from bones, or that at rest, and the surface is moved out of bones; by default off.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -126,7 +126,7 @@ class Rods(MovingSurface):
         self._carry(number)
 
     def _begin(self, number: int) -> None:
-        """Move rods as a blend of the bones at their ends, which are at their bones."""
+        """Move rods by a blend of the motions of the bones at their ends, and the end points exactly with these bones."""
         share, between = (np.linspace(0, 1, self.settings.points + i)[:, None] for i in (0, 1))
         first, last = (self._moved(ends, number) for ends in self.ends)
         self.rods = (1 - share) * first[0] + share * last[0]
@@ -163,7 +163,7 @@ class Rods(MovingSurface):
         return kernels.matrices(kernels.unit(before + sign * after))
 
     def _carry(self, number: int) -> None:
-        """Move surface and fibres with the rods, each point of which turns and scales what is around it."""
+        """Move surface and fibres with the rods; each point of a rod rotates and scales its surroundings."""
         maps = (self.radii / self.radius)[..., None, None] * self._frames()
         shifts = self.rods - np.einsum("kpij,kpj->kpi", maps, self.rest)
         parts = np.concatenate([maps.reshape(-1, 9), shifts.reshape(-1, 3)], axis=1)
@@ -179,7 +179,7 @@ class Rods(MovingSurface):
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
 
     def ending(self) -> Outcome:
-        """Converged: every iteration counts as such."""
+        """Converged, as no iteration fails."""
         count, points = self.rest.shape[:2]
         return Outcome("converged", f"{count} rods of {points} points, of {self.radius:.3g} mm radius at rest")
 
@@ -189,7 +189,7 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
     asked = min(count + 1, len(carriers))
     away, near = (found.reshape(len(points), asked) for found in cKDTree(carriers).query(points, k=asked))
     reach = away[:, -1:] * (1 if asked > count else 2) + np.finfo(float).tiny
-    # All of them may be as near: then each has the same share.
+    # If all are equally near, each has the same share.
     weights = (1 - (away / reach) ** 2) ** 2 + 1e-12
     weights /= weights.sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(points)), asked)

@@ -1,7 +1,7 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
-Of k rods of p points each: ``points`` (k, p, 3) and ``radii`` (k, p) [mm]; ``turns`` (k, p + 1, 4), unit quaternions (w, x, y, z)
-that take each segment's frame from rest, between those of the two bones. Bones prescribe the end points, all others are free.
+k rods of p points each have ``points`` (k, p, 3) and ``radii`` (k, p) [mm], and ``turns`` (k, p + 1, 4): unit quaternions
+(w, x, y, z) that rotate each segment's frame from rest, first and last those of the two bones. Bones prescribe the end points.
 
 All constraints of a kind are projected at once (Jacobi), each by a share that keeps the sum with its neighbours' steps from
 overshooting. Where constraints contradict each other the limit is the least sum of squares, for any order of points.
@@ -28,7 +28,7 @@ def pure(vectors: Floats) -> Floats:
 
 
 def conjugate(turns: Floats) -> Floats:
-    """The opposite turns (..., 4)."""
+    """The inverse rotations (..., 4)."""
     return np.asarray(turns * [1.0, -1.0, -1.0, -1.0])
 
 

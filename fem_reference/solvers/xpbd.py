@@ -3,10 +3,10 @@
 Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
 resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step.
-Here too few sweeps are too soft, enough of them make an implicit Euler step, and the equilibrium depends on the time step
+Here too few sweeps give too soft a muscle, enough of them an implicit Euler step, and the equilibrium depends on the time step
 only as far as directions change within a step. All this holds where the sweeps resolve a step: ``sqrt(k / m) dt`` of the stiffest
-edges below about 1, or more sweeps. Where it is 3, as in the settings for Table 5.1 (1.1 for half of the edges, one
-sweep), twice the sub-steps move the case hip_flexion by up to 1.6 mm, 0.7 mm on average, where it has moved by 53 mm.
+edges below about 1, or more sweeps. In the settings for Table 5.1 it is 3 (1.1 for half of the edges) with one sweep: twice the
+sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
 
 Frame number n is the state after iteration n, ``frame_time`` after the one before; meanwhile bones move steadily.
 """
@@ -32,8 +32,8 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
-    ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
+    """Contact of bones with free vertices. ``gap`` [mm]: how near vertices may come, or as near as they are at rest;
+    ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
     """
 
     gap: Annotated[units.Length, Field(ge=0)]
@@ -43,13 +43,13 @@ class XpbdCollision(Record):
 class XpbdSettings(Record):
     """The settings of the method and of the muscle; every key is required but those that turn an effect on.
 
-    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of
-    the reference and of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
-    step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
+    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of the reference and
+    of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time step. ``density``
+    [t/mm3]: that of the enclosed body; its mass is divided among the vertices in proportion to area.
 
-    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
-    [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay without forces.
-    ``collision``: contact with bones.
+    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: the stiffness of a plate. ``volume``
+    [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate at which velocities decay without forces. ``collision``:
+    contact with bones.
     """
 
     frame_time: units.Time
@@ -85,13 +85,13 @@ class XpbdConstraints:
 
     @classmethod
     def at_rest(cls, surface: Surface, attached: Ints, settings: XpbdSettings) -> "XpbdConstraints":
-        """Constraints of a closed ``surface`` whose vertices ``attached`` (k,) are attached; none of a kind without stiffness.
+        """Constraints of a closed ``surface`` with ``attached`` vertices (k,); none of a kind without stiffness.
 
         In a net of equal triangles, edges of the stiffness ``stretch a / l^2`` of their length l and the area a of both their
         triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
         as a plate of the stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
         """
-        # The compiled functions know writable arrays only.
+        # Compiled functions accept writable arrays only.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
         areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
@@ -157,7 +157,7 @@ def advance(
     step: XpbdStep,
     contacts: Sequence[BoneContact] = (),
 ) -> tuple[Floats, Floats]:
-    """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step: their Algorithm 1."""
+    """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step, Algorithm 1 of the paper."""
     at, dt = constraints, step.seconds
     loose = (at.inverse_masses > 0)[:, None]
     velocities = math.exp(-step.damping * dt) * velocities + np.where(loose, dt * np.array(step.acceleration), 0.0)

@@ -1,4 +1,4 @@
-"""Checks of arguments of the Python API: an unusable one is refused by name before anything is done."""
+"""Checks of arguments of the Python API, made before any work; each error names its argument."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -53,7 +53,7 @@ def check_solver(solver: object, settings: Mapping[str, object]) -> None:
     if solver is not None and not isinstance(solver, str) and not hasattr(solver, "__name__"):
         raise InputError("solver", said(solver), "the name of a solver, a function, or None")
     if solver is None and settings:
-        want = 'the name of the solver that they are of, such as solver="fenicsx"'
+        want = 'the name of their solver, such as solver="fenicsx"'
         raise InputError(f"settings {', '.join(settings)}", "no solver", want)
 
 
@@ -82,11 +82,11 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless it is a run of the ``case``, as far as it names its case."""
+    """Raise InputError unless it is a run of the ``case``, if it names a case at all."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}
-    if case.decisions and isinstance(effects, Mapping):  # of a run for which it was found out which it needs
+    if case.decisions and isinstance(effects, Mapping):  # a run in which unneeded effects were left out
         acting = tuple(one.effect for one in case.decisions if one.effect.title in effects)
         keys.add(case.model_copy(update={"effect": acting}).key)
     if scene is not None and scene not in keys:

@@ -1,6 +1,6 @@
-"""Several muscles solved together by one reference: a comparison for each, with candidates that solve it by itself."""
+"""Several muscles solved together by one reference: a comparison for each, with candidates that solve it alone."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,8 +22,8 @@ ALONE = "Each candidate solves each muscle by itself, without the other muscles.
 
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
-    """Comparisons of the ``muscles`` of a case, by name. ``worst``: for each solver and pair of muscles that it has, the solver,
-    the pair, their greatest depth of overlap [mm], and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
+    """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, a pair of its muscles, the greatest depth
+    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
     """
 
     muscles: dict[str, Comparison]
@@ -67,7 +67,12 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
         solved = [some[name] for some in runs.values() if name in some]
         found[name] = judging.compare(part, solved[0], solved[1:])
     lacking = tuple((entry.name, name) for i, (entry, _) in enumerate(chosen) for name in parts if own[name][i] is None)
-    return ByMuscle(found, tuple(_worst(runs)), lacking)
+    worst = list[tuple[str, str, str, float, int]]()
+    for who, some in runs.items():
+        for one, other, depth in neighbours.depths(some):
+            at = int(np.nanargmax(depth)) if np.isfinite(depth).any() else 0
+            worst.append((who, one, other, float(depth[at]), some[one].numbers[at]))
+    return ByMuscle(found, tuple(worst), lacking)
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
@@ -77,11 +82,3 @@ def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | No
         return chosen
     folder = Path(entry.settings["folder"]) / name
     return (entry.model_copy(update={"folder": str(folder)}), place) if folder.exists() else None
-
-
-def _worst(runs: dict[str, dict[str, Run]]) -> Iterator[tuple[str, str, str, float, int]]:
-    """The rows of ``ByMuscle.worst``."""
-    for who, own in runs.items():
-        for one, other, depth in neighbours.depths(own):
-            at = int(np.nanargmax(depth)) if np.isfinite(depth).any() else 0
-            yield who, one, other, float(depth[at]), own[one].numbers[at]

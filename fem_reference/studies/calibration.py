@@ -64,7 +64,7 @@ def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, wo
         values = [{one.key: one.at(float(at)) for one, at in zip(parameters, point, strict=True)} for point in points]
         made = _made(varied, values, store, workers)
         lost.extend(one for one in made if isinstance(one, Failure))
-        return [None if isinstance(one, Failure) else _asked(case, one, rows, store) for one in made]
+        return [None if isinstance(one, Failure) else _values(case, one, rows, store) for one in made]
 
     with fenicsx.shared():
         found = calibration.fit(forward, parameters, rows, case.name)
@@ -88,7 +88,7 @@ def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
 
 
 def unit_of(case: MuscleCase, quantity: str, place: str) -> str:
-    """The unit of a quantity that a run of the case may have; InputError at ``place`` where it has no such one."""
+    """The unit of a quantity of the case; InputError at ``place`` where the case has no such quantity."""
     kind, name, axis = _split(quantity)
     bones = [bone.name for bone in case.bone]
     if kind == "force":
@@ -116,7 +116,7 @@ def _split(quantity: str) -> tuple[str, str, str]:
 
 
 def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run | Failure]:
-    """The runs of the case with other ``values`` by key, or why one has no answer."""
+    """The runs of the case with other ``values`` by key; a ``Failure`` for one that has no answer."""
     found, trials = dict[int, Run | Failure](), dict[int, Trial]()
     for i, one in enumerate(values):
         said = ", ".join(f"{key} {value:.6g}" for key, value in one.items())
@@ -129,8 +129,8 @@ def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, wor
     return [found[i] for i in range(len(values))]
 
 
-def _asked(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path) -> Floats:
-    """The values (m,) of a ``run`` that the ``rows`` ask for."""
+def _values(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path) -> Floats:
+    """The values (m,) of a ``run`` for the measured ``rows``."""
     context = context_of(shared_bench(case, store).setup(), run)
     changes = change(run, context, sorted({row.quantity.partition(".")[0] for row in rows} - {"force", "position"}))
     return np.array([_value(run, row, changes) for row in rows])

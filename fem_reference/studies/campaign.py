@@ -24,17 +24,17 @@ from fem_reference.studies.variations import Trial, without_states
 
 log = logging.getLogger(__name__)
 
-# How often a run is tried again whose worker died.
+# Attempts at a run whose worker died.
 ATTEMPTS = 3
-# A run that ended so ends so again; one that timed out or crashed may have had other reasons.
+# A run that ended with one of these would do so again; one that timed out or crashed may succeed.
 _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Solvers of runs: so many processes of this machine (``count``), or the workers of the Dask scheduler at ``address``, such as
-    one that dask-jobqueue started on a cluster; these see the same store. InputError where it is fewer than one.
+    """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at ``address``, such as
+    one that dask-jobqueue started on a cluster; these see the same store. InputError where there are fewer than one.
     """
 
     count: int = 1
@@ -45,7 +45,7 @@ class Workers:
             raise InputError("--workers", self.count, "1 or more")
 
     def __str__(self) -> str:
-        """The manner of runs, beside what machine it is."""
+        """The way in which runs were solved, for reports."""
         if self.address is not None:
             return "runs by the workers of a cluster"
         return "runs one after the other" if self.count == 1 else f"runs {self.count} at once"
@@ -53,7 +53,7 @@ class Workers:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A trial with its ``run``, or why there is none (``failure``)."""
+    """A trial with its ``run``, or the reason ``failure`` why there is none."""
 
     trial: Trial
     run: Run | None
@@ -153,7 +153,7 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
 
 
 def _by_worker(trial: Trial, store: Path) -> tuple[Path | None, str]:
-    """The folder of the run that a worker made of a trial, or why there is none: the run itself is read from the store."""
+    """The folder of the run of a trial, or the reason why there is none: the main process reads the run from the store."""
     found = _made(trial, store)
     return found.run.folder if found.run else None, found.failure
 
@@ -166,12 +166,12 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 def _executor(workers: Workers) -> Iterator[Executor]:
     """Processes of this machine, or the workers of a Dask scheduler, which hands the run of a worker that died to another one."""
     if workers.address is None:
-        # Processes of their own and no forks: numba, PETSc and locks do not survive those.
+        # Spawned processes, as numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())
         with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
             try:
                 yield executor
-            except BaseException:  # a stop too: else it would wait for the runs that workers are in
+            except BaseException:  # an interruption too: else the executor would wait for runs in progress
                 for worker in set(multiprocessing.active_children()) - before:
                     worker.terminate()
                 raise

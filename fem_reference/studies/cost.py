@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 # The metrics of every point of the study; the joint moment only where a solver has forces.
 METRICS = (*in_tables(), "joint_moment")
-# Surface solvers are also tried on 4**power times as many triangles; these surfaces are stored beside the runs.
+# Surface solvers also run on 4**power times as many triangles; these surfaces are stored beside the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
 SURFACES = "surfaces"
@@ -157,7 +157,7 @@ def costs(run: Run) -> dict[str, float]:
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
     found = {name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")}
-    # A time that a program states is of a frame number: one frame that is wanted may be many of these.
+    # A program states its time per frame number; one frame of the scene may be several of these.
     return found | ({} if seconds is None else {"seconds_per_frame": seconds})
 
 

@@ -1,4 +1,4 @@
-"""The best fit of laws to measured cubes, beside the shipped material, which is not fitted: what a law could reach at all."""
+"""Best fits of laws to measured cubes, beside the shipped material, which is not fitted: the limit of what a law can reach."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 
 Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
-_STEP = 1e-4  # of a parameter's logarithm, against 1e-8 that root finding leaves
+_STEP = 1e-4  # of a parameter's logarithm, far above the error of root finding, 1e-8
 _MOST = 100  # evaluations; these fits converge in at most 30
 _SHEAR = SHIPPED[0].parameters[0][1]
 
 
 @dataclass(frozen=True)
 class _Ended:
-    """The end of a fit: its parameters, and whether it converged in so many evaluations."""
+    """The result of a fit: its parameters, whether it converged, and its number of evaluations."""
 
     parameters: tuple[float, ...]
     converged: bool
@@ -28,8 +28,8 @@ class _Ended:
 
 
 def shipped_law() -> Fitted:
-    """The shipped law, fitted to the cubes of Van Loocke et al. by its shear modulus; its fibres stay, as ratios of stresses do not
-    change with the scale of both.
+    """The shipped law, fitted to the cubes of Van Loocke et al. by its shear modulus alone: ratios of stresses do not change if
+    fibres and matrix are scaled together.
     """
     to = [one for one in QUANTITIES if one.experiment == LOOCKE and not one.is_order]
     ended = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
@@ -41,8 +41,8 @@ def shipped_law() -> Fitted:
 
 
 def collagen_law(most: int = _MOST) -> Fitted:
-    """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at most so many
-    evaluations. Only the fibres have a published range: no publication that was read fits ``k1`` and ``k2`` of this law.
+    """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at ``most`` so many
+    evaluations. Only the fibres have a published range: no publication known here has ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)
@@ -67,7 +67,7 @@ def _shipped(shear: float) -> Material:
 def _fitted(
     material: Callable[[Sequence[float]], Material], to: Sequence[Quantity], start: Sequence[float], most: int = _MOST
 ) -> _Ended:
-    """The parameters, all above zero, of the ``material`` that meets the quantities best, near the ``start``."""
+    """The parameters, all above zero, of the ``material`` that best fits the quantities, found from ``start``."""
 
     def misses(logs: Floats) -> list[float]:
         made = material([float(one) for one in np.exp(logs)])

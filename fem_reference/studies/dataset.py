@@ -1,11 +1,11 @@
 """A data set to learn from: muscles solved, checked and measured, with hashes, splits and metadata, in one folder.
 
-dataset.json               version, splits, the SHA-256 of every other file, what was left out and why
+dataset.json               version, splits, the SHA-256 of every other file, scenes left out with the reason
 datacite.json              metadata in DataCite's schema 4.6
 load.py                    a loader: numpy alone
 scenes/NAME/case.toml      the case, as ``fem-reference run scenes/NAME`` solves it, and muscle.ply; none of shipped cases
-           /frames.npz     arrays, as :func:`arrays` has them
-           /bars.json      error bars of every statistic by frame; doubts, as that det F is small at the rim of an attachment
+           /frames.npz     the arrays of :func:`arrays`
+           /bars.json      error bars of every statistic by frame; doubts, such as a small det F at the rim of an attachment
 """
 
 import hashlib
@@ -43,17 +43,17 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Changed with any change of what is drawn or stored: the same version, seed and sizes are the same scenes.
+# Raise it with any change of scenes or stored arrays: the same version, seed and sizes mean the same scenes.
 VERSION = "1.0.0"
 SHIPPED = ("hip_flexion",)  # of the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
-_TEST = 0.25  # the share of poses, and of shapes, to test with
+_TEST = 0.25  # the share of poses, and of shapes, in the test part
 _SAME = 0.01  # shapes whose volume and principal moments differ by less than this share are one shape
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """A data set: how many ``muscles`` are drawn from a ``seed``, each in so many ``poses`` beside rest, and ``shipped`` cases."""
+    """A data set: the number of ``muscles`` drawn from a ``seed``, that of ``poses`` of each beside rest, and ``shipped`` cases."""
 
     muscles: int
     poses: int
@@ -62,14 +62,14 @@ class Sizes:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Its identity, which stays the same as long as the folder is the same data set."""
+        """Its identity, by which a build recognises the data set in a folder."""
         drawn = {"muscles": self.muscles, "poses": self.poses, "seed": self.seed, "shipped": list(self.shipped)}
         return {"version": VERSION, **drawn}
 
 
 def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[str, object]:
-    """Make the data set in a ``folder``, with runs in ``store``; its index. Again after a kill it goes on from the stored runs.
-    InputError where the folder has another data set, or nothing.
+    """Make the data set in a ``folder``, with runs in ``store``, and return its index. An interrupted build continues from the
+    stored runs. InputError where the folder has another data set or other files, or no scene passes.
     """
     place = folder / INDEX
     if place.exists() and (known := texts.read_json(place, "the index of a data set"))["wanted"] != wanted.facts:
@@ -97,7 +97,7 @@ def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[st
 
 
 def hashes(folder: Path) -> dict[str, str]:
-    """The SHA-256 of every file of the data set by name but of its index, hidden ones (half-written) left out."""
+    """The SHA-256 of every file of the data set by name, except the index and hidden (half-written) files."""
     paths = (one for one in sorted(folder.rglob("*")) if one.is_file() and one.name != INDEX)
     names = ((one.relative_to(folder), one) for one in paths)
     shown = {str(name): one for name, one in names if not any(part.startswith((".", "__")) for part in name.parts)}
@@ -105,7 +105,7 @@ def hashes(folder: Path) -> dict[str, str]:
 
 
 def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
-    """Make the scene ``name`` of a data set; empty, or why it is left out, and then gone."""
+    """Make the scene ``name`` of a data set; the reason if it is left out, and its folder then removed, else an empty text."""
     place = folder / "scenes" / name
     try:
         if name in wanted.shipped:
@@ -134,7 +134,7 @@ def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
 
 
 def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None) -> str:
-    """The reason why a ``run`` is no truth to learn from; empty where it passes all that is asked."""
+    """The reason why a ``run`` is no truth to learn from; empty where it passes all checks."""
     case = bench.scene
     checks = run.origin.get(RECORD, {}).get("checks", [])
     if run.outcome.status != "converged" or run.numbers != case.numbers:
@@ -222,7 +222,7 @@ def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str,
 
 
 def _same_poses(one: Arrays) -> Ints:
-    """The group of each frame, 0 for those as the first: the same poses of all bones and the same activation."""
+    """The group of each frame, 0 for that of the first; frames of a group have equal poses of all bones and equal activation."""
     count = len(one["frames"])
     at = np.concatenate([one["poses"].reshape(count, -1), one["activation"].reshape(count, 1)], axis=1).round(6)
     seen: dict[bytes, int] = {}
@@ -230,7 +230,7 @@ def _same_poses(one: Arrays) -> Ints:
 
 
 def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
-    """The group of each surface: of the same volume and principal moments, wherever it is and however it is turned."""
+    """The group of each surface; surfaces of a group have the same volume and principal moments, in any place and orientation."""
     measures = []
     for at, faces in zip(points, triangles, strict=True):
         spread_out = np.linalg.eigvalsh(np.cov((at[faces].mean(axis=1)).T))
@@ -244,11 +244,11 @@ def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
 
 
 def metadata(wanted: Sizes, scenes: int, frames: int) -> dict[str, object]:
-    """DataCite's metadata (schema 4.6) of a data set, without a DOI, which who publishes it adds."""
+    """DataCite's metadata (schema 4.6) of a data set, without a DOI, which the publisher adds."""
     about = (
         f"{frames} states of {scenes} muscles under prescribed motion of bones, activation and contact, solved by finite "
-        "elements, with meshes, fibres, poses, stress, forces and error bars. Geometry is made by the project: no anatomy of "
-        "anybody is in it. Only states that a second check and all expectations pass are in it."
+        "elements, with meshes, fibres, poses, stress, forces and error bars. The project made the geometry: it contains no "
+        "anatomy of any person. Every state has passed a second check and all expectations."
     )
     return {
         "schemaVersion": "http://datacite.org/schema/kernel-4",

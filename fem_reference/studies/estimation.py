@@ -1,7 +1,7 @@
 """The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: error against parameters.
 
-Also the decompositions of a muscle into fibres (report 6.1.2) against each other: direction, length, points outside, crossings, and
-what the reference answers with each.
+The decompositions of a muscle into fibres (report 6.1.2) are compared with each other too: direction, length, points outside,
+crossings, and the reference's answer with each.
 """
 
 import logging
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 CASES = ("hip_flexion", "gluteus_maximus", "gluteus_medius", "iliacus_anatomical", "adductor_brevis")
 KNOWN = (4, 6, 10, 20)  # points of a fibre
 CENTRES, GAUSSIANS = (4, 9, 16, 25), (10, 30, 100)
-_ALONG = 1000  # points at which a curve is looked at
+_ALONG = 1000  # sample points of a curve
 _POLYNOMIAL = 3  # terms of a plane
 LAPLACE = "Laplace field"
 # The statistics of an answer that fibres may change, and the law of fibres in a case without one: that of hip_flexion.
@@ -56,11 +56,11 @@ ANSWERS = (
 )
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS, AROUND = 20, 20, 12
-NEAR = 0.2  # two fibres that are nearer [mm] between their ends cross
+NEAR = 0.2  # two fibres cross if they are nearer than this [mm] between their ends
 _ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
-_LOOKED_AT = 400  # points at which a fibre is looked at
+_SAMPLED = 400  # sample points of a fibre
 _SAMPLES = 20_000  # random points in the box around a muscle
-_OUTSIDE = 1e-3  # a point is outside the surface from here on [mm]
+_OUTSIDE = 1e-3  # a point is outside the surface beyond this distance [mm]
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
@@ -84,7 +84,7 @@ def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimati
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
-    """Each technique on all fibres, of which so many points are known as leave two at least to compare with."""
+    """Errors of each technique on all fibres, by the number of known points, which leaves at least two points to compare with."""
     lines = [fibres.points[low:high] for low, high in pairwise(fibres.offsets)]
     for known in (count for count in KNOWN if all(len(line) >= count + 2 for line in lines)):
         for technique, (make, _) in TECHNIQUES.items():
@@ -93,14 +93,14 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
 
 
 def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
-    """Distances (k,) [mm] of a ``line`` (n, 3) from the curve that ``make`` makes of ``count`` of its points, spread evenly."""
+    """Distances (k,) [mm] of a ``line`` (n, 3) from the curve that ``make`` puts through ``count`` of its points, spread evenly."""
     known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
     away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
 
 
 def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
-    """Each choice of centres on each attached area with enough vertices."""
+    """Errors of each choice of centres on each attached area with enough vertices."""
     for entry in setup.attached:
         flat = _flat(setup.surface.points[entry.vertices])
         for count in (count for count in CENTRES if 2 * count <= len(flat[::2])):
@@ -114,8 +114,8 @@ def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
 
 
 def _flat(points: Floats) -> Floats:
-    """Points (n, 3) of an area about their middle in its own axes, the last across it, in order along the first: whatever the
-    axes of the scene and the numbers of the points. The third moment along each axis is positive.
+    """Points (n, 3) of an area about their mean in its principal axes, the last across it, sorted along the first. They do not
+    depend on the axes of the scene or the order of the points: the third moment along each axis is positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
@@ -132,7 +132,7 @@ def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str,
 
 
 def of_surface(case: str, setup: Setup) -> Iterator[FitError]:
-    """The muscle's surface by Gaussians."""
+    """Errors of the muscle's surface fitted by Gaussians."""
     surface = setup.surface
     for count in GAUSSIANS:
         found = fit(surface, count).project(surface.points)
@@ -142,7 +142,7 @@ def of_surface(case: str, setup: Setup) -> Iterator[FitError]:
 
 
 def of_rods(case: str, surface: Surface, fibres: Polylines) -> RodError:
-    """The rods along ``fibres``, at random points of the box around them and the muscle."""
+    """Errors of rods along ``fibres``, at random points of the box around them and the muscle."""
     volume = enclosed_volume(surface.points, surface.triangles)
     radius = float(np.sqrt(volume / (np.pi * fibres.lengths().sum())))
     lines = np.concatenate([_along(fibres.points[low:high]) for low, high in pairwise(fibres.offsets)])
@@ -157,7 +157,7 @@ def of_rods(case: str, surface: Surface, fibres: Polylines) -> RodError:
 
 
 def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionError]:
-    """Each source of fibres of a case against the Laplace field's and, where a file has some, against those."""
+    """Each source of fibres of a case compared with the Laplace field and, if it has any, with fibres from a file."""
     found = {
         name: anatomy.lines_of(one, rest.surface, partial(muscle.filled, one, rest))[0]
         for name, one in variants(case).items()
@@ -168,8 +168,8 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """The reference's answer on a case with each source of fibres, beside that with the Laplace field's and its error bars. Lengths
-    are those of the Laplace field's lines, carried by each surface.
+    """The reference's answer on a case with each source of fibres, beside that with the Laplace field and its error bars. Lengths
+    are those of the lines of the Laplace field, carried by each surface.
     """
     # Candidates may not fit other fibres.
     alone = case.model_copy(update={"candidate": ()})
@@ -211,7 +211,7 @@ def variants(case: MuscleCase) -> dict[str, MuscleCase]:
 def compared(
     case: str, surface: Surface, one: tuple[str, Polylines], other: tuple[str, Polylines]
 ) -> DecompositionError:
-    """Named fibres ``one`` beside the ``other`` in the ``surface`` of a muscle."""
+    """The differences of named fibres ``one`` from the ``other`` in the ``surface`` of a muscle."""
     (source, lines), (against, known) = one, other
     middles, along = NearestLine(known).segments
     directions = NearestLine(lines)(np.zeros(len(middles), np.int64), middles)
@@ -227,15 +227,15 @@ def compared(
 
 
 def crossings(lines: Polylines) -> int:
-    """The number of pairs of lines that come nearer than 0.2 mm to each other between their ends."""
+    """The number of pairs of lines nearer than ``NEAR`` to each other between their ends."""
     inner = [_along(lines.points[low:high], _ENDS) for low, high in pairwise(lines.offsets)]
-    numbers: Ints = np.repeat(np.arange(len(inner)), _LOOKED_AT)
+    numbers: Ints = np.repeat(np.arange(len(inner)), _SAMPLED)
     near = cKDTree(np.concatenate(inner)).query_pairs(NEAR, output_type="ndarray")
     pairs = np.sort(numbers[near], axis=1)
     return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
 
 
 def _along(line: Floats, left_out: float = 0.0) -> Floats:
-    """Points (400, 3) along a ``line`` (k, 3), of which the share ``left_out`` at either end is not looked at."""
-    at = np.linspace(left_out, 1 - left_out, _LOOKED_AT) * (len(line) - 1)
+    """Sample points (400, 3) along a ``line`` (k, 3), without the share ``left_out`` at either end."""
+    at = np.linspace(left_out, 1 - left_out, _SAMPLED) * (len(line) - 1)
     return np.stack([np.interp(at, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)

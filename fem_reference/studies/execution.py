@@ -105,7 +105,7 @@ class Bench[C: Case]:
             one.name: Bench(part, self.store, self.ranks) for one, part in zip(scene.muscle, scene.parts, strict=True)
         }
         for name, bench in made.items():
-            bench._setup = partial(_part_of, self._setup, name)
+            bench._setup = partial(lambda name: cast("MusclesSetup", self._setup()).muscles[name], name)
         return made
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
@@ -166,7 +166,7 @@ class Bench[C: Case]:
             self._begin()
             assert run.folder is not None  # from the store
             folder = self.folder(choice, place)
-            with making.locked(folder):  # continues the run that was stopped for this
+            with making.locked(folder):  # it continues the run that was stopped
                 pass_on(run.folder, folder)
 
     def _stored(self, wanted: Wanted) -> Run | None:
@@ -272,10 +272,3 @@ class Bench[C: Case]:
             "versions": versions(),
             "machine": machine(),
         }
-
-
-def _part_of(of: Callable[[], CaseSetup], name: str) -> Setup:
-    """The set-up of the muscle ``name`` of a case with several."""
-    whole = of()
-    assert isinstance(whole, MusclesSetup)
-    return whole.muscles[name]

@@ -1,4 +1,4 @@
-"""Numbers known of a case before it is solved: features, by which cases are compared, and the cost of its reference."""
+"""Numbers known about a case before it is solved: features, by which cases are compared, and the cost of its reference."""
 
 import math
 from typing import NamedTuple
@@ -17,8 +17,8 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
-# Measured on hip_flexion: seconds of processor time of one of Newton's iterations with so many unknowns, the exponent by which it
-# grows, and iterations a frame.
+# Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which it grows,
+# and iterations per frame.
 _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
 
 
@@ -42,7 +42,7 @@ def expected(body: Body, settings: Record) -> ExpectedCost:
 
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
-    attached vertex over the frames; ``contact``, how many bones may press; ``bulk_to_shear`` and ``fibres_to_shear`` of the
+    attached vertex over the frames; ``contact``, the number of obstacles; ``bulk_to_shear`` and ``fibres_to_shear`` of the
     material without its regions, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
     """
     points = setup.surface.points

@@ -1,4 +1,4 @@
-"""Import of data that is not part of the project: files of what somebody has downloaded, known by their content alone."""
+"""Import of data that is not part of the project: files that the user has downloaded, recognised by their content alone."""
 
 import hashlib
 import tarfile
@@ -16,7 +16,7 @@ _WANT = "a folder or an archive (zip, tar) with published data, whole"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by their path below the data folder: ``published`` as they are, or ``made`` of such."""
+    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from such files."""
 
     licence: str
     published: dict[str, tuple[int, str]]
@@ -29,8 +29,9 @@ def known() -> Listed:
 
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
-    """Write each file of ``wanted`` that a source, a folder or an archive, has into a new ``folder``; their paths below it. Names
-    in a source mean nothing. InputError, and no folder, where none is there, a source is damaged or the folder is in use.
+    """Write each file of ``wanted`` that a source, a folder or an archive, contains into a new ``folder``, and return their paths
+    below it. Names in a source are ignored. InputError, and no folder, where none is found, a source is damaged or the folder is
+    in use.
     """
     found, files = set[str](), wanted.published | wanted.made
     sizes = {size for size, _ in files.values()}
@@ -42,12 +43,12 @@ def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
                 (part / name).write_bytes(content)
                 found.add(name)
         if not found:
-            raise InputError(" ".join(map(str, sources)), f"none of the {len(files)} files that are known", _WANT)
+            raise InputError(" ".join(map(str, sources)), f"none of the {len(files)} known files", _WANT)
     return sorted(found)
 
 
 def cases_with(found: Collection[str]) -> list[str]:
-    """The shipped cases that need data, all of which is among the files ``found``."""
+    """The shipped cases that need data, if all of it is among the files ``found``."""
     needs = {name: casefile.read(name).needed_data for name in casefile.cases()}
     return [name for name, needed in needs.items() if needed and {*needed} <= {*found}]
 
@@ -67,5 +68,5 @@ def _contents(source: Path, sizes: Collection[int]) -> Iterator[bytes]:
                 yield from (archive.read(one) for one in archive.infolist() if one.file_size in sizes)
         else:
             raise ValueError("another file" if source.exists() else "nothing there")
-    except Exception as error:  # a damaged archive raises whatever occurs to its reader
+    except Exception as error:  # the reader of a damaged archive may raise anything
         raise InputError(source, str(error) or type(error).__name__, _WANT) from error

@@ -1,4 +1,4 @@
-"""Comparisons made of runs of a case of any kind; for a scalar case with the convergence of its reference."""
+"""Comparisons of runs of a case of any kind; for a scalar case with the convergence of its reference."""
 
 import logging
 import math
@@ -39,7 +39,7 @@ def compare(
     case, setup = bench.scene, bench.setup()
     if case.parts:
         raise InputError(
-            case.place, "a comparison of several muscles as one", "one of each: case.parts, and by_muscle of the run"
+            case.place, "a comparison of several muscles as one", "one for each: case.parts, and by_muscle of the run"
         )
     complete_runs = tuple(complete(run, case.numbers) for run in candidates)
     result = comparison.compare(case, setup, complete(reference, case.numbers), complete_runs, error_bars)
@@ -72,13 +72,13 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
     def error(built: FieldProblem, values: Floats) -> float:
         if exact is not None:
             return l2_distance(built.mesh, values, partial(scalar.at, exact))
-        # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
-        # own vertices alone converge with h^2 log h, and not with h^2.
+        # The vertices of a mesh come first in every finer one. All vertices of this mesh count: those of an irregular coarsest
+        # mesh alone would converge with h^2 log h, not with h^2.
         count = len(built.mesh.points)
         return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 
     for order in (1, 2):
-        # Without an exact solution the finest one of order 2 is what the others are measured against.
+        # Without an exact solution, the finest one of order 2 is the truth for the others.
         finest = levels if order == 1 or case.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)

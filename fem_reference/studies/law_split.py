@@ -1,4 +1,7 @@
-"""Error of a solver with tetrahedra as a sum: what it left out, its law, its mesh, its convergence, by references in its law."""
+"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh, its convergence.
+
+References in between differ in one part each: without the effects, in the solver's law, on its linear tetrahedra.
+"""
 
 import math
 from collections.abc import Collection, Iterator
@@ -15,11 +18,11 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 
-# Effects of a case that the law of a solver stands for.
+# Effects of a case that the law of a solver replaces.
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
-# The shear modulus, in bulk moduli, beside a law without resistance to shear at rest, where its equilibrium is not unique.
-# It moves the end of a bar that turns by 1 rad by 0.02 mm; a tenth of it does not always converge.
+# The shear modulus, in bulk moduli, added to a law that does not resist shear at rest, where its equilibrium is not unique.
+# It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it Newton's method does not always converge.
 _WEAK = 1e-4
 
 
@@ -35,7 +38,7 @@ class Split:
 
 
 def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
-    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, of a Poisson's ratio of at most ``poisson``; InputError
+    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, with a Poisson's ratio of at most ``poisson``; InputError
     where it has no such law, or laws of regions.
     """
     found = moduli([one for one in case.effects if name_of(one) in LAW])
@@ -49,8 +52,8 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
 
 
 def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
-    """The error of a ``run`` by a solver of a ``law`` on the tetrahedra of the case, linear in each, without springs; ``takes``:
-    the other effects that it has. InputError where a reference in between has no solution.
+    """The parts of the error of a ``run`` by a solver with a ``law`` on linear tetrahedra of the case, without springs; ``takes``:
+    the other effects that it models. InputError where a reference in between has no solution.
     """
     path = [bench.reference(), *_references(bench, law, takes), run]
     frames = np.isfinite(run.positions).all(axis=(1, 2))
@@ -61,7 +64,7 @@ def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str
 
 
 def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -> Iterator[Run]:
-    """References without what the solver leaves out; in its law; and so with linear tetrahedra."""
+    """References without the effects that the solver leaves out; also in its law; also on linear tetrahedra."""
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
     _check_held(bench)
@@ -85,8 +88,8 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
-    """InputError where no solver can hold the muscle exactly: without attachments, and by springs whose stiffness times its size is
-    below its shear modulus.
+    """InputError where exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
+    muscle's size is below its shear modulus.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
     soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
@@ -107,8 +110,8 @@ def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
 
 
 def check_law(name: str, poisson: object, place: str) -> None:
-    """InputError, which names the ``place`` of a solver's keys, where the reference has no such law with Lame's parameters, or
-    ``poisson`` is no Poisson's ratio.
+    """InputError at the ``place`` of a solver's keys where the reference has no such law with Lame's parameters, or ``poisson`` is
+    no Poisson's ratio.
     """
     known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
     if name not in known:

@@ -1,4 +1,4 @@
-"""A run while it is made: alone in its folder, frames stored as they are reached, and watched for effects that its case omits."""
+"""The making of a run: locked in its folder, frames stored as they are reached, watched for effects that its case omits."""
 
 import logging
 import math
@@ -29,16 +29,16 @@ log = logging.getLogger(__name__)
 
 
 class StoppedError(Exception):
-    """A run that has to continue with other effects; the reason."""
+    """Raised to stop a run that has to continue with other effects."""
 
 
 class OvertimeError(Exception):
-    """A run that has taken the processor time that it may take; the reason."""
+    """Raised to stop a run that has used up its processor time."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A run that is wanted: the ``name`` that pages give it, its solver and settings, and the ``folder`` that it is stored in."""
+    """A run that is wanted: its ``name`` on pages, its solver and settings, and the ``folder`` in which it is stored."""
 
     name: str
     choice: SolverChoice
@@ -47,7 +47,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run that ``ended`` so; None without one, by other packages, or where it lacks states that are wanted."""
+        """The stored run with a status of ``ended``; None without one, or if made by other packages or without wanted states."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -65,7 +65,7 @@ class Wanted:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """A context in which only this process makes the run in ``folder``: a second process waits, and then finds it made."""
+    """A context in which only this process makes the run in ``folder``: a second process waits, and then finds it stored."""
     files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:
@@ -79,7 +79,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def bars_kept(folder: Path) -> Iterator[None]:
-    """Keep the error bars beside a run where the same packages solve it again for its states."""
+    """A context that keeps the error bars beside a run if the same packages solve it again for its states."""
     path, before = folder / error_bars.FILE, store.finished(folder)
     same = before is not None and before.origin.get("versions") == versions()
     bars = path.read_text(encoding="utf-8") if same and path.is_file() else None
@@ -89,7 +89,7 @@ def bars_kept(folder: Path) -> Iterator[None]:
 
 
 def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple[Decision, ...]]:
-    """The effects that matter at each of the frames ``numbers`` that a ``folder`` stores, as ``watch`` sees them anew."""
+    """The effects that matter at each of the frames ``numbers`` stored in a ``folder``, found anew by ``watch``."""
     watch.frames.clear()
     for number in numbers:
         yield watch.see(number, *places(folder, number))
@@ -103,8 +103,8 @@ def _stop_for(found: Sequence[Decision]) -> None:
 
 
 def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None, time_limit: float = math.inf) -> None:
-    """Solve, write each frame as it is reached, and the cost; ``watch`` may stop the run. Without any frame, the rest state. More
-    than ``time_limit`` [s] of processor time of this process ends it at the next frame.
+    """Solve, and write each frame as it is reached, then the cost; without any frame, write the rest state. ``watch`` may stop the
+    run; more than ``time_limit`` [s] of processor time of this process ends it at the next frame.
     """
 
     def add(frame: Frame) -> None:
@@ -117,7 +117,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
             _stop_for(watch.see(frame.number, frame.surface, frame.points if len(frame.points) else None))
 
     if watch is not None:
-        list(seen(watch, writer.folder, writer.frames))  # stored by a process before this one
+        list(seen(watch, writer.folder, writer.frames))  # those stored by an earlier process
     forget_peak_memory()
     clock, began = MachineTime.now(), time.process_time()
     try:
@@ -129,11 +129,13 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
     except OvertimeError as why:
         outcome = Outcome("timed out", str(why))
     processor, cost = time.process_time() - began, outcome.cost
-    if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
+    if (
+        "seconds_compile" in cost
+    ):  # compilation does not count; the rest takes at most as much processor time as clock time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
-    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own says what those used
+    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own states their use
     if not writer.frames:
         rest = writer.rest
         writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))

@@ -19,10 +19,10 @@ from fem_reference.scenes.muscle import Keyframe, MuscleCase
 from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
-LARGER = 1.25  # tetrahedra of a second run, that says how far the arms depend on their size
+LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far the arms depend on it
 _EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and in which a bone turns by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
-# Flexion [rad]: of the shipped cases, and from -10 to 90 degrees, as far as a reference goes.
+# Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)
 _FARTHEST = 1.0  # the flexion [rad] that a run must reach
 
@@ -86,8 +86,8 @@ def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Float
 
 
 def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> MuscleCase:
-    """The case on tetrahedra of ``tet_size`` [mm] that are not refined, with nobody compared, and with a hip that goes from rest to
-    the least ``flexion`` [rad], 0 or less, and on to the greatest one.
+    """The case on unrefined tetrahedra of ``tet_size`` [mm], without candidates, with a hip that moves from rest to the least
+    ``flexion`` [rad], 0 or less, and then to the greatest one.
     """
     back, on = (round(_RAD * angle) for angle in flexion)
     turned = {0: 0.0, -back: back / _RAD, on - 2 * back: on / _RAD}  # frame numbers and flexion
@@ -103,7 +103,7 @@ def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> 
 
 
 def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
-    """Angles of flexion (a,) [deg], against the joint's own about the axis to the left, and arms of flexion (a, k) [mm] there."""
+    """Angles of flexion (a,) [deg], opposite to the joint's angle about the axis to the left, and arms of flexion (a, k) [mm]."""
     context = context_of(bench.setup(), run)
     if len(context.joints) != 1:
         raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one")
@@ -121,20 +121,17 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
     try:
         if not rows:
             raise ValueError("no row")
-        return _curve(rows) if experiment == NEMETH else _envelope(rows, muscle)
+        if experiment != NEMETH:
+            return _envelope(rows, muscle)
+        columns = ("hip_flexion_deg", "extension_moment_arm_mm")
+        angles, arms = (np.array([float(row[key]) for row in rows]) for key in columns)
+        return ArmRange(angles, arms, arms)
     except (KeyError, ValueError) as error:
-        raise InputError(str(path), repr(error), "angles and moment arms, as numbers below their heads") from None
-
-
-def _curve(rows: list[dict[str, str]]) -> ArmRange:
-    angles, arms = (
-        np.array([float(row[key]) for row in rows]) for key in ("hip_flexion_deg", "extension_moment_arm_mm")
-    )
-    return ArmRange(angles, arms, arms)
+        raise InputError(str(path), repr(error), "columns of angles and moment arms, in numbers") from None
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range in mm, of a file in cm, at the angles of both sides together."""
+    """The range [mm] of arms, from a file in cm, at the angles of both bounds together."""
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

@@ -1,4 +1,4 @@
-"""New scenes: a copy of a case, or one made of the surfaces of a muscle and its bones."""
+"""New scenes: a copy of a case, or one made from the surfaces of a muscle and its bones."""
 
 import re
 import shutil
@@ -20,21 +20,21 @@ from fem_reference.io import files
 from fem_reference.io.texts import toml_text
 from fem_reference.scenes import casefile
 
-# The units among which a guess is made: those of LENGTH_UNITS that scanners and modellers write.
+# The units among which one is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
 _GUESSED = ("mm", "cm", "m", "in")
-# The lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
+# The range of lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
 # A muscle's greatest distance from a bone it is attached to, as a share of its length; beyond it they were scaled or moved apart.
 _APART = 0.5
 # The share of vertices, those nearest to a bone, that are attached; less where two attachments would share some.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
-_LONGEST = 60  # characters of what is written of a name that a scene cannot have, or that a file cannot
+_LONGEST = 60  # characters that are kept of a name unfit for a scene or a file
 
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of length of surfaces, by ``name``, and ``why``: empty where it was given, and not guessed."""
+    """The unit of length of surfaces, by ``name``; ``why`` it was guessed, empty if it was given."""
 
     name: str
     why: str = ""
@@ -50,16 +50,16 @@ class _Attached:
 
 
 def copied(case: str, folder: Path) -> None:
-    """A copy of a case, with the files beside it, in a new ``folder``."""
+    """Copy a case, with the files beside it, into a new ``folder``."""
     scene = casefile.read(case)
     shutil.copytree(scene.folder, _new(folder))
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """A scene in a new ``folder``, which names it, with the surfaces in mm; returns the unit that they were read in.
+    """Write a scene into a new ``folder``, which names it, with the surfaces in mm; return the unit in which they were read.
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
-    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones.
+    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one that gives muscle and bones a usual length.
     InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
@@ -95,7 +95,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """True where a scene file can use it as a name."""
+    """True where ``name`` is allowed as a name in a scene file."""
     try:
         return bool(check_name(name))
     except ValueError:
@@ -124,7 +124,7 @@ def _new(folder: Path) -> Path:
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
-    """The unit of coordinates of which each surface, by its own size, may be; InputError where that leaves none or several."""
+    """The one unit in which the size of each surface is possible; InputError where that leaves no unit or several."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
         size, (least, most) = diagonal(surface.points), _LONG[kind]
@@ -134,13 +134,13 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
         said.append(f'"{name}" is {size:.3g} long, a {kind} in {" or ".join(units) or "no unit"}')
     shared, why = set.intersection(*fitting), "; ".join(said)
     if len(shared) != 1:
-        what = "several units are" if shared else "no unit is"
-        raise InputError("--unit", f"none, where {why}: {what} one of all of them", f"one of {', '.join(LENGTH_UNITS)}")
+        what = "several units suit" if shared else "no unit suits"
+        raise InputError("--unit", f"none, where {why}: {what} all of them", f"one of {', '.join(LENGTH_UNITS)}")
     return Unit(shared.pop(), why)
 
 
 def _welded(surface: Surface, unit: float) -> Surface:
-    """The surface in mm, with one point where several are the same, in their order: STL files have three points a triangle."""
+    """The surface in mm, with equal points merged, in their order: STL files have three points for each triangle."""
     points = surface.points * unit
     _, first, which = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
     place = first.argsort().argsort()
@@ -150,7 +150,7 @@ def _welded(surface: Surface, unit: float) -> Surface:
 
 
 def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached, _Attached]:
-    """Attachments to the two bones that the muscle is nearest to, at its vertices nearest to each, none of them in both."""
+    """Attachments to the two bones nearest to the muscle, at its vertices nearest to each; no vertex is in both."""
     away = {name: distances(muscle.points, bone).distance for name, bone in bones.items()}
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
     for name in (first, second):
@@ -172,7 +172,7 @@ def _nearest(bone: str, away: Floats, share: float) -> _Attached:
 
 
 def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str, str]) -> str:
-    """The scene file, the surfaces by name being at these ``paths`` beside it."""
+    """The text of the scene file; ``paths`` of surfaces beside it, by name."""
     ends = _attachments(muscle, bones)
     volume = enclosed_volume(muscle.points, muscle.triangles)
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
@@ -192,7 +192,7 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
     return Template(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).substitute(
         name=name,
         title=toml_text(name.replace("_", " ").strip() or name),
-        proves=toml_text(f"How the muscle of {source} goes with {moving}."),
+        proves=toml_text(f"The motion of the muscle of {source} with {moving}."),
         muscle=source,
         triangles=len(muscle.triangles),
         length=f"{diagonal(muscle.points):.0f}",
@@ -209,7 +209,7 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
 
 
 def _joint(muscle: Surface, bones: dict[str, Surface], ends: tuple[_Attached, _Attached]) -> tuple[Floats, Floats]:
-    """A guess of an axis and a centre of the motion between two bones: where these are nearest, across the muscle."""
+    """A guess of the axis and the centre of the motion between two bones: across the muscle, where the bones are nearest."""
     first, second = (bones[end.bone].points for end in ends)
     away, which = cKDTree(first).query(second)
     nearest = int(away.argmin())

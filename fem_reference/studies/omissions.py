@@ -29,14 +29,14 @@ from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
-# A run with something left out may take so many times as long as the whole, and the time [s] to compile a form that is new.
+# A run with something left out may take this many times as long as the whole, plus a time [s] to compile a new form.
 LIMIT, COMPILING = 2.0, 60.0
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver; each by name. ``support``: True
-    where it includes that of contact at rest.
+    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver, each by name; with ``support``
+    also the support by contact at rest.
     """
 
     effects: dict[str, Effect]
@@ -45,7 +45,7 @@ class LeftOut:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of all of it."""
+        """The names of everything left out."""
         return *self.effects, *self.features, *(["support of contact"] if self.support else [])
 
 
@@ -74,14 +74,14 @@ def is_material(effect: Effect) -> bool:
 
 
 def name_of(effect: Effect) -> str:
-    """The name of an effect in scene files, and where it acts if it does so in a region or on a part of the surface."""
+    """The name of an effect in scene files, with the region or the part of the surface on which it acts, if any."""
     name = effects.name_of(effect)
     name += f" on {effect.on}" if isinstance(effect, Load) else ""
     return name + (f" in {region}" if (region := effects.region_of(effect)) else "")
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
-    """The optional features that a choice has: keys whose default is None, but those that trade accuracy or change time alone."""
+    """The optional features of a choice: keys whose default is None, except those that trade accuracy or affect only time."""
     record = solvers.find(choice.solver, place).settings
     optional = {key for key, entry in record.model_fields.items() if entry.default is None}
     optional -= {*solvers.trades(record), *MACHINE_ONLY}
@@ -89,9 +89,9 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
 
 
 def parts(whole: Trial) -> tuple[LeftOut, ...]:
-    """Everything that can be left out of a trial: each effect of the scene but its material where the solver simulates them, else
-    each feature of its own; and all of them, where there are several. Something elastic is left in any case. With tension at rest
-    goes what only that balances there: effects that act at the first frame, and the support by bones.
+    """Everything that can be left out of a trial: each effect of the scene except its material, where the solver simulates effects,
+    else each feature of the solver; and all of them together. Something elastic always remains. Tension at rest is left out along
+    with all that it balances there: effects that act at the first frame, and the support by bones.
     """
     if not solvers.takes_effects(whole.choice.solver):
         found = features(whole.choice, whole.name)
@@ -104,7 +104,7 @@ def parts(whole: Trial) -> tuple[LeftOut, ...]:
 
 
 def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effect]) -> LeftOut:
-    """The part with ``some`` of the effects that have a name, and what cannot be without them."""
+    """The part with ``some`` of the ``named`` effects, and with all that depends on them."""
     if in_situ.among(some.values()) is None:
         return LeftOut(some)
     first, contact = case.frames.first, among(case.effects)
@@ -113,7 +113,7 @@ def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effec
 
 
 def without(whole: Trial, part: LeftOut) -> Trial:
-    """The trial with a part left out, by an element that suits what is left."""
+    """The trial with a part left out, by an element that suits the remaining effects."""
     kept, choice, instead = _kept(whole.scene, part), whole.choice, dict[str, Any]()
     scene = whole.scene.model_copy(update={"effect": kept}) if part.effects else whole.scene
     element = getattr(solvers.settings(choice, whole.name), "element", None) if part.effects else None
@@ -125,7 +125,7 @@ def without(whole: Trial, part: LeftOut) -> Trial:
 
 
 def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
-    """The effects that are left."""
+    """The effects that remain without a part."""
     kept = tuple(effect for effect in case.effects if effect not in part.effects.values())
     contact = among(kept) if part.support else None
     return tuple(one.model_copy(update={"support": None}) if one is contact else one for one in kept)
@@ -142,7 +142,7 @@ def fitting(element: str, effects: Sequence[Effect]) -> str:
 
 
 def _wholes(case: MuscleCase) -> list[Trial]:
-    """The reference, and the candidates of which something can be left out."""
+    """The trials of the reference and of candidates with something that can be left out."""
     trials = [Trial(case, candidate, candidate.name) for candidate in case.candidate]
     moving = (one for one in trials if solvers.find(one.choice.solver, one.name).moves != "nothing")
     return [Trial(case, case.reference, "reference"), *(one for one in moving if parts(one))]
@@ -155,7 +155,7 @@ def _warm_up(case: MuscleCase, store: Path) -> None:
         if solvers.takes_effects(trial.choice.solver):
             continue
         offer = solvers.find(trial.choice.solver, trial.name)
-        with suppress(InputError, MissingSoftware):  # of which its run says more
+        with suppress(InputError, MissingSoftware):  # its run reports these
             settings = bench.settings(trial.choice, trial.name)
             offer.require(settings)
             built: Any = bench.given(offer, settings)
@@ -163,7 +163,7 @@ def _warm_up(case: MuscleCase, store: Path) -> None:
 
 
 def _limited(trial: Trial, whole: Made) -> Trial:
-    """The trial of a run with something left out, which gives up after some time where its solver can."""
+    """The trial of a run with something left out, with a time limit if its solver has that setting."""
     settings = solvers.settings(whole.trial.choice, whole.trial.name)
     if whole.run is None or "time_limit" not in type(settings).model_fields:
         return trial
@@ -173,7 +173,7 @@ def _limited(trial: Trial, whole: Made) -> Trial:
 
 
 def _bars(bench: Bench[MuscleCase], truth: Run | None) -> tuple[dict[str, float], str]:
-    """The error bars of the reference, the greatest over the frames; and why there are none."""
+    """The error bars of the reference, the greatest over the frames, and the reason if there are none."""
     if truth is None:
         return {}, "the reference did not reach all frames"
     try:
@@ -200,13 +200,13 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
 
 
 def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
-    """The end of a run and its cost."""
+    """The outcome of a run and its cost."""
     costs = dict(one.run.outcome.cost) if one.run else {}
     return Omission(left_out, *one.ended, costs=costs, instead=one.trial.changed)
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
-    """The displacement of the surface by an effect, as its indicator estimates it, where that alone is left out."""
+    """The displacement of the surface by an effect that alone is left out, as its indicator estimates it."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()

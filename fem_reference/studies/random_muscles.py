@@ -1,4 +1,4 @@
-"""Muscles drawn at random by a seed, as cases: a spindle or strap between two bones, and what moves and activates it."""
+"""Muscles drawn at random by a seed, as cases: a spindle or strap between two bones, with motion and activation."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 EVERY = 10  # frame numbers from a pose to the next
 _AROUND, _ALONG = 20, 21  # vertices of every surface, so that vertex i is at the same part of each
-_TETS = 150  # about so many tetrahedra, each then cut into eight
+_TETS = 150  # approximate number of tetrahedra, each then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """
 [[bone]]
@@ -45,7 +45,7 @@ pennation = "{:.4g} deg\""""
 
 
 def shape(rng: np.random.Generator) -> tuple[Surface, float]:
-    """A closed surface along z, with elliptic sections and flat ends at 0 and at its length [mm], which comes with it."""
+    """A closed surface along z, with elliptic sections and flat ends at 0 and at its length [mm]; surface and length."""
     length, wide = rng.uniform(50, 110), rng.uniform(9, 16)
     flat, first, last = rng.uniform(0.55, 1), rng.uniform(0.5, 0.95), rng.uniform(0.5, 0.95)
     belly, bow = rng.uniform(0.35, 0.65), rng.uniform(0, 0.1) * length
@@ -85,9 +85,9 @@ def _turn(axis: Sequence[float], centre: Sequence[float], amounts: Floats) -> st
 
 
 def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
-    """Write muscle ``number`` of a ``seed`` into a ``folder``, in so many ``poses`` beside rest, which follow each other at random:
-    the lower bone turns about an axis beside the muscle; of every three muscles, two have an upper bone that turns about an axis
-    of its own, one an obstacle that slides into its side, and two are activated. All is drawn from the seed and the number.
+    """Write muscle ``number`` of a ``seed`` into a ``folder``, with this number of random ``poses`` beside rest. The lower bone
+    turns about an axis beside the muscle. Of every three muscles, two have an upper bone that turns about another axis, one has an
+    obstacle that slides into its side, and two are activated. The seed and the number determine all random values.
     """
     rng = np.random.default_rng([seed, number])
     surface, length = shape(rng)
@@ -96,7 +96,7 @@ def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
     values |= {"size": f"{np.cbrt(6 * np.sqrt(2) * volume / _TETS):.4g}"} | _drawn(rng, surface, number, poses)
     template = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     files.make_folder(folder)
-    if not (folder / "muscle.ply").exists():  # a file that others read is not replaced: it would be the same
+    if not (folder / "muscle.ply").exists():  # another process may be reading the same file
         files.write_surface(folder / "muscle.ply", surface, surface.points)
     files.write_text(folder / "case.toml", Template(template).substitute(values))
     return casefile.read_muscle(folder)

@@ -32,26 +32,25 @@ from fem_reference.studies.variations import on_tetrahedra, with_contact, with_d
 log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
-# Files that bars are made by, beside the metrics.
+# Files whose code makes error bars, beside the metrics.
 _MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
 
-# A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement; another has a mesh of
-# its own for it, larger by so much.
+# The coarse run of a scene with refined tetrahedra omits the last refinement; that of another scene has its own mesh, with
+# tetrahedra larger by this factor.
 RATIO = 1.5
-# Up to this share of the time of a reference its error bars are made without being asked for: a run on larger tetrahedra takes the
-# share of the time that these are of the number.
+# Error bars are made unasked if they take at most this share of the time of the reference, estimated by numbers of tetrahedra.
 CHEAP = 0.2
 
-# What is quadratic has as many unknowns on the same cells as what is linear on cells of half the size, and does not lock.
+# A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
 def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touched: bool = True) -> dict[str, Vary]:
-    """Changes by name that each halve one cause of numerical error beside tetrahedra: the compliance and smoothing of contact, and
-    the error and rounding of distances to bones, unless no bone ``pressed``, or the muscle never ``touched`` itself; load steps,
-    where the ``settings`` have them, with drag, viscosity or friction only: else a state does not depend on them.
+    """Changes, by name, that each halve one cause of numerical error beside tetrahedra: compliance and smoothing of contact with
+    bones, if one ``pressed``, and of the muscle with itself, if it ``touched`` itself; error and rounding of distances to bones;
+    load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
     found, bones = dict[str, Vary](), among(case.effects) if pressed else None
     itself = touching.among(case.effects) if touched else None
@@ -69,7 +68,7 @@ def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touc
 
 
 def half_steps(case: MuscleCase, settings: Record) -> Vary:
-    """Load steps of at most half the length: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
+    """A change to load steps of at most half the length; each step ends at a frame, so ``frames.every`` bounds its length too."""
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
     halved = {"first_step": own["first_step"] / 2, "largest_step": largest}
@@ -77,7 +76,7 @@ def half_steps(case: MuscleCase, settings: Record) -> Vary:
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
-    """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
+    """The error bars of the ``reference`` of a bench, from runs in the store or solved now; they are stored beside the reference.
     With ``model``, also the change by exact attachments. None for a run that did not converge, and for one without an interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
@@ -100,7 +99,7 @@ def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars
 
 
 def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | None:
-    """Error bars: new ones where ``asked`` for; else stored ones, or new ones that cost less than a fifth of the reference."""
+    """Error bars: new ones if ``asked`` for; else stored ones, or new ones that cost less than a fifth of the reference."""
     if asked:
         return obtain(bench, reference)
     found = stored(reference)
@@ -126,7 +125,7 @@ def stored(reference: Run) -> ErrorBars | None:
 
 
 def needed(bench: Bench[MuscleCase], reference: Run) -> dict[str, Vary]:
-    """The variations of a reference: where nothing pressed in it, the stiffness of contact changes nothing."""
+    """The variations that can change a reference: those of contact only if something was pressed."""
     areas = [reference.scalars.get(f"{name}_area") for name in ("contact", "touching")]
     pressed, touched = (area is None or bool(np.nanmax(area) > 0) for area in areas)
     settings = bench.settings(bench.scene.reference, "reference")
@@ -134,7 +133,7 @@ def needed(bench: Bench[MuscleCase], reference: Run) -> dict[str, Vary]:
 
 
 def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
-    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error halved that its bars have."""
+    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error in its bars halved."""
     scene = on_tetrahedra(bench.scene, tet_size=ratio * bench.scene.muscle.tet_size)
     for vary in needed(bench, reference).values():
         scene = vary(scene)
@@ -149,7 +148,7 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     if model and springs:
         attached = tuple(entry.model_copy(update={"stiffness": None}) for entry in base.attachment)
         scenes[_EXACT] = base.model_copy(update={"attachment": attached})
-    # Newton's method takes less than quadratic time of the unknowns: what larger tetrahedra save is at least their number.
+    # The time falls at least in proportion to the number of tetrahedra.
     seconds = reference.outcome.cost.get("seconds", 0.0) * (sizes[0] / sizes[1]) ** 3
     runs = {}
     for i, (name, changed) in enumerate(scenes.items()):
@@ -160,19 +159,20 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
         except InputError as error:
             if name != _EXACT:
                 raise
-            log.info("error bar: without what exact attachments would change: %s", error)
+            log.info("error bar: without the change by exact attachments: %s", error)
     coarse = runs[larger]
     if not _tets(coarse) < _tets(reference):
         got = f"meshes of {_tets(reference):.0f} and {_tets(coarse):.0f} tetrahedra"
-        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that a coarser mesh differs from")
+        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size for which a coarser mesh differs")
     return Pair(
         reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench), springs
     )
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
-    """Factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
-    smallest attachment, where that is above 1. Nested tetrahedra share its polygon, and their difference does not show its error.
+    """The factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
+    smallest attachment, if that is above 1. Nested tetrahedra share its polygonal outline, so their difference does not show its
+    error.
     """
     rest, radii = bench.setup(), [math.inf]
     for entry in rest.attached:
@@ -219,7 +219,7 @@ def _measuring_hash() -> str:
 
 
 def _tets(run: Run) -> float:
-    """The number of tetrahedra of a run, NaN where it does not say."""
+    """The number of tetrahedra of a run, NaN where it is not stated."""
     tets = run.origin.get("mesh", {}).get("tets")
     return tets if isinstance(tets, float | int) else math.nan
 
@@ -245,7 +245,7 @@ def body_bars(solved: Run) -> BodyBars | None:
 def sharper_problem(
     body: Body, settings: fenicsx.BodySettings
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
-    """A sharper problem: the body, indices of the points of ``body`` among its own, changes of the settings, and these in words."""
+    """A more accurate problem: its body, indices of the points of ``body`` in it, changed settings, and the changes in words."""
     changes: dict[str, float | str | None] = {"store_state": False}
     said = ""
     if body.rubs or any(

@@ -1,4 +1,4 @@
-"""Standings made: the reference, our solvers, other people's programs and submitted frames on cases; rows that hold are kept."""
+"""Standings of the reference, our solvers, other people's programs and submitted frames on cases; valid rows are kept."""
 
 import hashlib
 import logging
@@ -28,25 +28,25 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own, which need nothing, and those of the report's anatomy, by what they cost.
+# Cases of our own, which need no data, then those of the report's anatomy, in the order of their cost.
 CASES = (
     *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
     *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
 )
 # The processor time [s] that a solver may take on a case.
 TIME_LIMIT = 600.0
-# The machine of frames that were submitted with their time.
+# The machine of frames submitted with their time.
 THEIRS = "as stated by its authors"
-# How far [mm] (rms) the reference may be from rest at the last frame for solvers to be asked how far they are.
+# The distance [mm] (rms) from rest up to which the reference counts as back at the last frame; then that of solvers is measured.
 _BACK = 0.1
-# What is measured: beside deviations of shape, the moment about the joint where a solver has forces.
+# The metrics of all rows; the joint moment only where a solver has forces.
 _METRICS = (*in_tables(), "joint_moment")
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it ``takes``; ``case``:
-    the only one that it has frames of, empty for all; ``scene``: the key of the one that they were exported of, empty if not known.
+    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it ``takes``; for frames
+    the only ``case`` that they are of, empty for all, and the key ``scene`` of its export, empty if unknown.
     """
 
     candidate: Candidate
@@ -94,11 +94,13 @@ def stand(
     time_limit: float = TIME_LIMIT,
 ) -> Standings:
     """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``; each may take ``time_limit`` [s]
-    of processor time on a case. Of the rows ``before``, those of other cases are kept, and with ``only`` some states
-    (``STATES``) those in no such state.
+    of processor time on a case, whatever it states itself. Of the rows ``before``, those of other cases are kept; if ``only`` names
+    states (``STATES``), rows in other states are kept too.
     """
     _check_names(entrants)
-    entrants = [_within(one, time_limit) for one in entrants]
+    limit = {"time_limit": f"{time_limit:g} s"}
+    limited = [one.candidate.model_copy(update=limit if one.candidate.solver == COMMAND else {}) for one in entrants]
+    entrants = [replace(one, candidate=candidate) for one, candidate in zip(entrants, limited, strict=True)]
     rows, missing, asked = list[Standing](), dict[str, str](), list[str]()
     for scene in scenes:
         asked.append(scene.name)
@@ -109,16 +111,10 @@ def stand(
             missing[scene.name] = str(error)
     for one in entrants:
         if one.case not in ("", *asked):
-            missing[f"{one.case}, {one.candidate.name}"] = f"this case is not asked, only {', '.join(asked)}"
+            missing[f"{one.case}, {one.candidate.name}"] = f"this case is not solved here, only {', '.join(asked)}"
     done = {row.case for row in rows}
     rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
-
-
-def _within(one: Entrant, time_limit: float) -> Entrant:
-    """The entrant with the limit [s] where it is a program: for all alike, whatever it states itself."""
-    given = {"time_limit": f"{time_limit:g} s"} if one.candidate.solver == COMMAND else {}
-    return replace(one, candidate=one.candidate.model_copy(update=given))
 
 
 def _check_names(entrants: Sequence[Entrant]) -> None:
@@ -151,9 +147,9 @@ def _on(
         name = one.candidate.name
         try:
             if name in taken and one not in ours:
-                raise InputError(name, "the name of a solver of ours", "another name")
+                raise InputError(name, "the name of one of our solvers", "another name")
             if one.scene not in ("", case.key):
-                raise InputError(f"{name}: scene", f'"{one.scene}"', f'"{case.key}", which it is now')
+                raise InputError(f"{name}: scene", f'"{one.scene}"', f'"{case.key}", the present key')
             key = measured.key(one)
             old = known.get(name)
             if old is not None:
@@ -182,7 +178,7 @@ class _Measured:
         return "" if self.reference.folder is None else self.reference.folder.name
 
     def key(self, one: Entrant) -> str:
-        """The key of the run of an entrant; for submitted frames a hash of what is submitted."""
+        """The key of the run of an entrant; for submitted frames a hash of the submission."""
         if one.candidate.solver == "recorded":
             said = recorded.checked_about(Path(one.candidate.settings["folder"]), None)
             return hashlib.sha256(said.model_dump_json().encode()).hexdigest()[:16]
@@ -193,9 +189,9 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run of this ``key``; late where it took more than the time limit, also in the store of another limit."""
+        """The row of a run of this ``key``; late where it took more than the time limit, even if stored under another limit."""
         own = run is self.reference
-        submitted = one.candidate.solver == "recorded"  # its time is of another machine
+        submitted = one.candidate.solver == "recorded"  # its time was measured on another machine
         limit = None if own or submitted else self.bench.time_limit
         late = limit is not None and run.outcome.cost.get("seconds_processor", 0.0) > limit
         status = "timed out" if late and run.outcome.status == "converged" else run.outcome.status
@@ -228,7 +224,7 @@ class _Measured:
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:
-        """The parts of the error of a solver that states its law and reached all frames, where the references in between do."""
+        """The parts of the error of a solver that states its law, if it and the references in between reached all frames."""
         if one.law is None or run.outcome.status != "converged":
             return {}
         try:
@@ -240,6 +236,6 @@ class _Measured:
 
 
 def _from_rest(run: Run, reference: Run) -> float | None:
-    """Return the distance [mm] (rms) from the first to the last frame; None where the reference does not come back."""
+    """The distance [mm] (rms) from the first to the last frame; None where the reference does not come back."""
     away = [np.sqrt(np.mean(np.sum((one.positions[-1] - one.positions[0]) ** 2, axis=1))) for one in (run, reference)]
     return float(away[0]) if away[1] <= _BACK and np.isfinite(away[0]) else None

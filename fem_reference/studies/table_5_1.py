@@ -1,4 +1,4 @@
-"""Table 5.1 of the report on every scenario: each solver run where no run is stored, timed, and measured against the reference."""
+"""Table 5.1 of the report: every solver on every scenario, timed and measured against the reference; stored runs are reused."""
 
 import logging
 from collections.abc import Iterable
@@ -22,8 +22,8 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own, which need nothing, and the five of the report (6.1.3 to 6.1.6). Its iliacus as the report's program attached it has no
-# solution beyond frame 77 (see the case): here it has its anatomical attachments.
+# Our own, which need no data, and the five of the report (6.1.3 to 6.1.6). The iliacus has its anatomical attachments here: with
+# those of the report's program it has no solution beyond frame 77 (see the case).
 SCENARIOS = (
     "hip_flexion",
     "box_squeeze",
@@ -156,8 +156,8 @@ def _result(
 
 
 def seconds_of(run: Run) -> float | None:
-    """The time [s] of a frame number where a solver makes one for each, as its ``candidate.toml`` may say; else of a frame that is
-    wanted; None where it is not known.
+    """The time [s] per frame number, where a solver computes each or its ``candidate.toml`` states it; else per wanted frame; None
+    where it is unknown.
     """
     cost = run.outcome.cost
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))

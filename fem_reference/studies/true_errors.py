@@ -1,4 +1,4 @@
-"""The finer solutions that error bars are compared with: on smaller tetrahedra, with finer contact."""
+"""True errors to check error bars against, by finer solutions: on smaller tetrahedra, with stiffer contact."""
 
 from collections.abc import Iterable
 from functools import partial

@@ -1,4 +1,4 @@
-"""The band that unknown parameters of a case allow: runs of its reference on a Latin hypercube, and its candidates beside it."""
+"""The bands of results that uncertain parameters of a case allow, by runs of its reference on a Latin hypercube."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -18,27 +18,29 @@ from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import judging, refinement
-from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
+from fem_reference.studies.campaign import Workers, carry_out, shared_bench
 from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
-# The quantities that have a band beside the surface's and forces, of those that a case has.
+# The quantities with a band, beside the surface and forces, where a case has them.
 QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")
 SURFACE = ("surface_deviation", "rms")
 FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """The bands of a case from so many ``runs`` of its reference, none where the case itself has no solution; InputError where no
-    parameter has a range.
+    """The bands of a case from this number of ``runs`` of its reference, none where the case itself has no solution; InputError
+    where no parameter has a range.
     """
     varied = unknowns(case)
     case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # nothing is judged
     points = sampled(len(parameters), runs, seed)
     trials = [_trial(varied, parameters, point) for point in points]
-    empty = _none(varied, parameters, seed, made_with(str(workers)))
+    title, size = varied.whole.title, varied.whole.muscle.tet_size / 2**varied.whole.muscle.refinements
+    own = parameters, varied.fixed(), 0, seed, (), ()
+    empty = Uncertainty(varied.whole.name, title, size, *own, origin=made_with(str(workers)))
     with fenicsx.shared():
         reference = shared_bench(case, store).reference()
         if reference.outcome.status != "converged":
@@ -47,25 +49,21 @@ def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int 
         comparison, lost = _nominal(case, reference, store, workers)
         made = carry_out(trials, store, workers)
     answered = [one.reached is not None for one in made]
+    failed = [one for one in made if one.reached is None]
     design = Design(parameters, points[answered], runs)
     found = tuple(of_runs(comparison, design, [run for one in made if (run := one.reached) is not None]))
     known = [one.run.outcome.cost.get("seconds_processor", np.nan) for one in made if one.run]
     return replace(
         empty,
         runs=runs,
-        failures=tuple(_failure(one, parameters) for one in made if one.reached is None),
+        failures=tuple(
+            Failure({p.key: float(one.trial.changed[p.key]) for p in parameters}, *one.ended) for one in failed
+        ),
         bands=found,
         placed=tuple(place(run.name, band, values) for run, band, values in _beside(comparison, found)),
         lost=lost,
         seconds=float(np.mean(known)) if known else np.nan,
     )
-
-
-def _none(varied: Unknowns, parameters: tuple[Parameter, ...], seed: int, origin: dict[str, str]) -> Uncertainty:
-    """The result of no runs yet."""
-    whole, size = varied.whole, varied.whole.muscle.tet_size / 2**varied.whole.muscle.refinements
-    own = parameters, varied.fixed(), 0, seed, (), ()
-    return Uncertainty(whole.name, whole.title, size, *own, origin=origin)
 
 
 def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> Trial:
@@ -76,16 +74,12 @@ def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> 
 
 
 def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
-    """The case itself with its error bars beside its candidates, and by candidate why it did not reach all frames."""
+    """The comparison of the case itself, with error bars, and the reasons why candidates did not reach all frames, by name."""
     bench = shared_bench(case, store)
     bars = refinement.bars(bench, reference, model=False)
     made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)
     lost = {one.trial.name: ": ".join(one.ended) for one in made if one.reached is None}
     return judging.compare(bench, reference, [one.run for one in made if one.run], bars), lost
-
-
-def _failure(one: Made, parameters: Sequence[Parameter]) -> Failure:
-    return Failure({known.key: float(one.trial.changed[known.key]) for known in parameters}, *one.ended)
 
 
 def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iterator[Band]:
@@ -113,7 +107,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
 
 
 def _rows(found: Sequence[Floats], like: Floats) -> Floats:
-    """The values (n, f) of runs, of which there may be none."""
+    """The values (n, f) of n runs, even for n = 0."""
     return np.array(found).reshape(len(found), len(like))
 
 
@@ -132,13 +126,13 @@ def _surface(comparison: Comparison, context: MeasurementContext, design: Design
 
 
 def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal: Floats) -> Band:
-    """A band of nothing yet, around the answer of the case."""
+    """A band without values yet, around the answer of the case."""
     unknown = np.full(len(nominal), np.nan)
     return Band(quantity, title, unit, comparison.reference.numbers, nominal, unknown, unknown, unknown)
 
 
 def _beside(comparison: Comparison, found: Sequence[Band]) -> Iterator[tuple[Run, Band, Floats]]:
-    """Each candidate that has a value of a quantity, with the band, where there is one, and its values (f,)."""
+    """Each candidate with each band that was not refused and its own values (f,) of the quantity."""
     for run in comparison.candidates:
         for band in found:
             metric, _, statistic = band.quantity.partition(".")

@@ -1,4 +1,4 @@
-"""The unknown parameters of a case and their ranges, by keys that count in its file, and the case with others of them."""
+"""The unknown parameters of a case and their ranges, by the keys of its file, and the case with other values."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True)
 class Unknowns:
-    """A case as its file has it (``whole``), in whose effects keys count, and the places there of the effects that act (``kept``):
-    with ``effects = "auto"`` those that the case itself needs, in all runs.
+    """A case as in its file (``whole``), whose effects the keys number, and the indices of the effects that act (``kept``): with
+    ``effects = "auto"``, in all runs, those that the case needs with its own values.
     """
 
     whole: MuscleCase
@@ -25,22 +25,24 @@ class Unknowns:
         return self.at({})
 
     def at(self, values: dict[str, float]) -> MuscleCase:
-        """The case with other ``values`` by key, in their units inside; InputError where a file could not have them."""
+        """The case with other ``values`` by key, in internal units; InputError where a file could not have them."""
         changed = casefile.with_numbers(self.whole, values)
         acting = tuple(changed.effect[i] for i in self.kept)
         return changed.model_copy(update={"effect": acting, "choice": "listed", "decisions": (), "uncertain": ()})
 
     def acts(self, key: str) -> bool:
-        """True where the number at a ``key`` is of no effect that the case leaves out."""
+        """True unless the number at a ``key`` belongs to an effect that the case leaves out."""
         first, *others = numbers.parts(key)
         return first != "effect" or others[0] in self.kept
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that have a range; InputError where there are none, or the case states one of an effect that it
-        leaves out.
-        """
+        """The parameters that have a range; InputError where there are none, or one belongs to an effect that is left out."""
         case, found = self.whole, []
-        self._check()
+        for i, entry in enumerate(case.uncertain):
+            if not self.acts(entry.key):
+                got = f'"{entry.key}", of {numbers.title(case, entry.key)}, which this case leaves out'
+                want = 'a number of an effect that acts, or effects = "listed"'
+                raise InputError(join(case.place, f"uncertain[{i}].key"), got, want)
         for key, one in ranges.ranges(case).items():
             if self.acts(key):
                 low, high = ranges.ends(case, key, one, join(case.place, key))
@@ -55,16 +57,9 @@ class Unknowns:
         """The titles of the numbers of acting effects that have no range."""
         return tuple(numbers.title(self.whole, key) for key in ranges.left_out(self.whole) if self.acts(key))
 
-    def _check(self) -> None:
-        for i, entry in enumerate(self.whole.uncertain):
-            if not self.acts(entry.key):
-                got = f'"{entry.key}", of {numbers.title(self.whole, entry.key)}, which this case leaves out'
-                want = 'a number of an effect that acts, or effects = "listed"'
-                raise InputError(join(self.whole.place, f"uncertain[{i}].key"), got, want)
-
 
 def unknowns(case: MuscleCase) -> Unknowns:
-    """The unknowns of a case as its file has it."""
+    """The unknowns of a case."""
     if case.choice == "listed":
         return Unknowns(case, tuple(range(len(case.effect))))
     needed = [one.needed for one in of_case.chosen(case).decisions]

@@ -1,4 +1,4 @@
-"""Variations of a case: one thing changed, and the ladders of a study, on which one setting is varied at a time."""
+"""Variations of a case: single changes, and the ladders of a study, which vary one setting at a time."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -27,7 +27,7 @@ from fem_reference.scenes.muscle import MuscleCase, VertexList
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 # Sizes of tetrahedra, in those of the case, at each number of refinements up to its own.
 _SIZES = (2.0, 1.6, 1.25, 1.0)
-# The reference's settings are varied on the mesh before the last refinement, or without one on tetrahedra so much larger.
+# The reference's settings are varied on the mesh before the last refinement or, without refinement, on tetrahedra of this factor.
 _COARSER = 1.6
 _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
@@ -54,14 +54,14 @@ def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:
-    """The ``choice`` of a run that is only measured: the reference stores no states."""
+    """The ``choice`` without stored states of the reference, for a run that is only measured."""
     return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
     """The case on a surface of ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
 
-    A vertex is attached where the nearest of the original surface is.
+    A vertex is attached if the nearest vertex of the original surface is.
     """
     surface = resampled(setup.surface, power)
     named = hashlib.sha256(surface.points.tobytes() + surface.triangles.tobytes()).hexdigest()[:16]
@@ -77,7 +77,7 @@ def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscle
         listed = {"vertices": VertexList(file=str(path)), "within": None, "outline": None}
         attachments.append(entry.model_copy(update=listed))
     muscle = case.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
-    # No file names these surfaces, so that they may be where they are.
+    # As no scene file names these surfaces, they may be in any folder.
     return case.model_copy(update={"muscle": muscle, "attachment": tuple(attachments), "from_file": False})
 
 
@@ -99,8 +99,8 @@ def carried(run: Run, surface: Surface) -> Run:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run to be made: of a ``scene`` by ``choice``, called ``name``; the varied key (``knob``) and its ``value``, and the
-    scene's keys that were ``changed``, as scene files write them.
+    """A run to be made of a ``scene`` by a ``choice`` of solver: its ``name``, the varied key (``knob``) and its ``value``, and the
+    ``changed`` keys of the scene, as scene files write them.
     """
 
     scene: MuscleCase
@@ -112,17 +112,17 @@ class Trial:
 
     @property
     def label(self) -> str:
-        """Its name in lines of progress."""
+        """Its name in progress messages."""
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
     def varied(self, knob: str, value: str, **changes: Any) -> "Trial":
-        """The trial with ``changes`` of its fields, by a ``knob`` beside what was varied before."""
+        """The trial with ``changes`` of its fields, named by a ``knob`` in addition to the former one."""
         beside = f" ({self.knob} = {self.value})" if self.knob else ""
         return replace(self, knob=knob, value=value + beside, **changes)
 
 
 def reference_trials(case: MuscleCase) -> Iterator[Trial]:
-    """The reference of a case on other tetrahedra; on coarse ones with each trade of its solver varied, and with other contact."""
+    """The reference of a case on other tetrahedra; on coarse ones also with other settings of its solver and other contact."""
     whole = Trial(case, case.reference, "reference")
     yield whole
     yield from _sizes(whole)
@@ -133,8 +133,8 @@ def reference_trials(case: MuscleCase) -> Iterator[Trial]:
 
 
 def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
-    """The candidates of a case, and those of Table 5.1 for every scene: with their own settings, with each setting varied that
-    trades accuracy for time, and on other meshes; ``surfaces``: by name, the case on other triangles.
+    """The candidates of a case, and those of Table 5.1 for every scene: with their own settings, with each setting that trades
+    accuracy for time varied, and on other meshes; ``surfaces``: the case on other triangles, by name.
     """
     known = list[dict[str, Any]]()
     for candidate in (*case.candidate, *solvers.in_table()):
@@ -188,7 +188,7 @@ def _settings(base: Trial) -> Iterator[Trial]:
 
 
 def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
-    """The trial by another element where that suits the effects; else the same energy of the volume with a pressure, or without."""
+    """The trial with another element; if it does not suit the effects, with the same volumetric energy with or without pressure."""
     plain, effects = base.varied("element", text, choice=choice), list(base.scene.effects)
     found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
     if len(found) != 1 or _suits(choice, base.scene.effects):
@@ -215,7 +215,7 @@ def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
 
 
 def _contact(base: Trial) -> Iterator[Trial]:
-    """Trials with stiffer and softer contact, and with more and less exact distances to bones; none without contact."""
+    """Trials with stiffer and softer contact, and with more and less accurate distances to bones; none without contact."""
     scene = base.scene
     contact = among(scene.effects)
     if contact is None:

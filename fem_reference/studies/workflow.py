@@ -27,7 +27,7 @@ STORE = Path("reports/runs")
 def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
     """Read a ``case``: the name of a shipped one, a folder with a ``case.toml``, or a scene file; with ``changes``: keys such as
     ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them. InputError where a key is missing,
-    unknown or wrong; it names file, key, what was got and what is wanted.
+    unknown or wrong; it states the file, the key, the value and the expected value.
     """
     arguments.check_changes(changes)
     path(case, "case")
@@ -99,9 +99,9 @@ def error_bars(
     """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a body
     on cells of its shape, from a solution on smaller cells or with more unknowns in each.
 
-    ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`. By
-    statistic a bar for each frame, in the unit of the statistic; of a body, of its points, forces, moments and energy. None where
-    the reference did not converge.
+    ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`.
+    Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None where the
+    reference did not converge.
     """
     with reported(progress):
         if arguments.is_of_body(reference, case):
@@ -129,7 +129,7 @@ def compare(
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
-    """Write all that another program needs to solve a case into a new or empty ``folder``; the names of the files.
+    """Write all that another program needs to solve a case into a new or empty ``folder``; return the names of the files.
 
     ``form``: ``"open"``, PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too. InputError where
     ``folder`` is not empty, or FEBio lacks an effect.
@@ -140,7 +140,7 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
 
 
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
-    """Write the runs of a muscle for ParaView into a new or empty ``folder``; the names of the files, or InputError.
+    """Write the runs of a muscle for ParaView into a new or empty ``folder``; return the names of the files, or raise InputError.
 
     ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files says what each array is.
     Stress, pressure and det F are included if the reference was solved with ``store_state = true``.
@@ -150,7 +150,7 @@ def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
 
 
 def write_report(comparison: Comparison, folder: str | Path) -> Path:
-    """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; the path of the page."""
+    """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; return the path of the page."""
     arguments.check_comparison(comparison)
     return report.write(report.of_comparison(comparison), arguments.free_folder(folder, "folder"), report.NAME)
 

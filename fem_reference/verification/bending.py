@@ -37,9 +37,7 @@ def flexed(thickness: float, length: float, angle: float, points: Floats, frame:
 
 
 def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in their planes; ``mu``
-    [MPa].
-    """
+    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in plane; ``mu`` [MPa]."""
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
     end = Prescribed("y1", "y1", (0, 1, 2), partial(flexed, THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
@@ -77,7 +75,7 @@ READINGS = {
         lambda: TRUE.radii()[0],
     ),
     "thickness": Reading(
-        "how thick it is halfway between its ends",
+        "its thickness halfway between its ends",
         "mm",
         lambda rest, state: float(np.ptp(state.points[rest[:, 1] == 0, 0])),
         lambda: np.diff(TRUE.radii())[0],
@@ -118,7 +116,7 @@ MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="the error changes
 def flexure(
     name: str, reading: str, element: str, wrong: dict[str, Any], error: tuple[float, str], **more: Any
 ) -> Entry:
-    """A ``reading`` of the bent block; ``error``: the tolerance, and what the finest cells leave."""
+    """A ``reading`` of the bent block; ``error``: the tolerance, and the error of the finest cells in words."""
     cells, counts = CELLS[element]
     stated: dict[str, Any] = {"refinement": Refinement(counts, THICKNESS / 2, order=4)} | wrong | more
     return Entry(

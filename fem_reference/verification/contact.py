@@ -22,7 +22,7 @@ BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, an
 
 
 def sliding_by(path: float) -> Callable[[float], Floats]:
-    """The pose, 4 x 4, of what slides along z by a ``path`` [mm] from frame 0 to frame 1."""
+    """The pose, 4 x 4, of a body that slides along z by a ``path`` [mm] from frame 0 to frame 1."""
     return RigidMotion((0.0, 0.0, 1.0), None, (0.0, 1.0), (0.0, path)).pose
 
 
@@ -37,8 +37,8 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
 
 
 def in_series(bulk: float, stiffness: float, travel: float) -> float:
-    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] where a spring on it of a ``stiffness`` [MPa/mm], whose end is
-    moved down by a ``travel`` [mm], has the same: contact is that spring beyond its smoothing.
+    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
+    is moved down by a ``travel`` [mm]: contact is that spring beyond its smoothing.
     """
     force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
 
@@ -59,7 +59,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
 
 def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     """Readings of the force ``name`` on a quarter: that of the whole ball [N], and the radius [mm] of the contact from its lever,
-    as Hertz's pressures have their middle at 3/8 of it.
+    as the resultant of Hertz's pressure on a quarter has its lever at 3/8 of it.
     """
     return {
         "force": lambda state: 4 * float(state.forces[name][2]),
@@ -67,7 +67,7 @@ def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     }
 
 
-# Beside these the greatest pressure [MPa].
+# Also the greatest pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
     **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
@@ -92,7 +92,7 @@ def known_ball(name: str) -> float:
 
 
 CONTACT = partial(Entry, group="contact", relative=True, kind="closed form")
-# Of readings of a ball their ends of names, titles and units.
+# By reading of a ball: the end of the entry's name, the end of its title, and the unit.
 _SAID = {
     "force": ("force", "its force", "N"),
     "contact_radius": ("radius", "the radius of the contact", "mm"),
@@ -137,7 +137,7 @@ ENTRIES = (
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
-            because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",
+            because="the state is homogeneous and the plate a spring: only Newton's residual of 1e-12 N remains",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
@@ -147,7 +147,7 @@ ENTRIES = (
         "A rigid ball pressed into a large body: {}",
         ball,
         known_ball,
-        "the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
+        "the mesh leaves 1 to 1.5 %; strains of a tenth, the end of the body and the depth of the ball each add less",
         READINGS,
     ),
 )

@@ -99,7 +99,7 @@ SMALL_STRAIN = control("small strain, by linear extrapolation of a tiny load", s
 def tip_entry(
     name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
 ) -> Entry:
-    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and by how much it is too stiff."""
+    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and the excess of stiffness in words."""
     words, counts = CELLS[element]
     by, order = ("by linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more

@@ -24,7 +24,7 @@ LIGHT = 1e-6  # a weight [N/mm3], for a stretch of 1e-4
 ETA, VISCOUS_SECONDS = 0.02, 1.5  # of the viscous blocks [MPa s], and from a frame number to the next [s]
 BULK = 1e6 * MU  # so high that the truth of incompressible material is met to 1e-6
 STRESS = 3e-4 * MU  # a small weight on the top of a block until frame 1, which then creeps back
-# Loads that are gone at frame 2.
+# Loads that are removed by frame 2.
 UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
 

@@ -1,7 +1,7 @@
 """Measured muscles beside the shipped material, which was chosen from other sources and is never fitted to these.
 
 An entry states whether the value is within the uncertainty of the experiment; outside is a finding, not a failure. Its value is
-pinned, so that a change of a law or of the material does not pass unseen.
+pinned, so that a change of a law or of the material is noticed.
 """
 
 from dataclasses import replace
@@ -44,30 +44,41 @@ def _control(name: str) -> tuple[str, Material]:
 
 
 def _entry(quantity: Quantity) -> Entry:
-    words, wrong = _control(quantity.name)
     first = quantity.facts[0]
+    confirmed = "" if first.doi_confirmed == "yes" else " (from memory)"
+    return _of(
+        quantity,
+        (SHIPPED, *_control(quantity.name)),
+        PINNED[quantity.name],
+        f"{quantity.experiment}, read in: {first.read_in}; doi {first.doi}{confirmed}",
+        from_memory=any(one.doi_confirmed == "no" for one in quantity.facts),
+    )
+
+
+def _of(
+    quantity: Quantity, tried: tuple[Material, str, Material], pinned: float, source: str, *, from_memory: bool = True
+) -> Entry:
+    """The entry of a quantity; ``tried``: the material, and the negative control in words and its material."""
     return EXPERIMENT(
         name=quantity.name,
         title=quantity.title,
         unit=quantity.unit,
         measure=measured,
-        given={"quantity": quantity, "material": SHIPPED},
-        negative_control=words,
-        wrong={"material": wrong},
+        given={"quantity": quantity, "material": tried[0]},
+        negative_control=tried[1],
+        wrong={"material": tried[2]},
         truth=quantity.truth,
         within=quantity.within,
         because=quantity.because,
-        source=f"{quantity.experiment}, read in: {first.read_in}; doi {first.doi}"
-        + ("" if first.doi_confirmed == "yes" else " (from memory)"),
-        pinned=PINNED[quantity.name],
+        source=source,
+        pinned=pinned,
         facts=quantity.facts,
         is_order=quantity.is_order,
-        from_memory=any(one.doi_confirmed == "no" for one in quantity.facts),
+        from_memory=from_memory,
     )
 
 
-_ORDER = "An order: 1 where both are met by 1 % and more, 0 where not."
-_LIMIT = "A law of fibres that pull in tension only meets neither."
+_BOTH = "van_loocke_2006, read in: quotation; takaza_2013, from memory"
 ORDERS = Quantity(
     name="cube_both_orders",
     title="Stiffer along the fibres in compression and across them in tension",
@@ -76,30 +87,10 @@ ORDERS = Quantity(
     facts=(),
     truth=1.0,
     within=0.5,
-    because=_ORDER,
-    limit=_LIMIT,
+    because="An order: 1 where both are met by 1 % and more, 0 where not.",
+    limit="A law of fibres that pull in tension only meets neither.",
     is_order=True,
 )
-
-
-def _orders(quantity: Quantity, pinned: float, materials: tuple[Material, Material], negative_control: str) -> Entry:
-    """Both orders of a material; the second of the ``materials`` is that of the negative control."""
-    return EXPERIMENT(
-        name=quantity.name,
-        title=quantity.title,
-        unit=quantity.unit,
-        measure=measured,
-        given={"quantity": quantity, "material": materials[0]},
-        negative_control=negative_control,
-        wrong={"material": materials[1]},
-        truth=quantity.truth,
-        within=quantity.within,
-        because=quantity.because,
-        source="van_loocke_2006, read in: quotation; takaza_2013, from memory",
-        pinned=pinned,
-        is_order=quantity.is_order,
-        from_memory=True,
-    )
 
 
 WITH_COLLAGEN = replace(
@@ -108,6 +99,6 @@ WITH_COLLAGEN = replace(
 
 ENTRIES = (
     *map(_entry, QUANTITIES),
-    _orders(ORDERS, 0.0, (SHIPPED, COLLAGEN), "Collagen across the fibres."),
-    _orders(WITH_COLLAGEN, 1.0, (COLLAGEN, SHIPPED), "No collagen."),
+    _of(ORDERS, (SHIPPED, "Collagen across the fibres.", COLLAGEN), 0.0, _BOTH),
+    _of(WITH_COLLAGEN, (COLLAGEN, "No collagen.", SHIPPED), 1.0, _BOTH),
 )

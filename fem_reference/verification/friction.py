@@ -24,7 +24,7 @@ LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
 def incline(lab: Lab, friction: float) -> Finding:
-    """The greatest tangent among those requested at which a block still sticks to a plane that turns below it under its weight."""
+    """The greatest requested tangent at which a block under its weight still sticks to a plane that turns below it."""
     angles = tuple(float(np.arctan(share * FRICTION)) for share in NEAR)
     frames = (0.0, *(float(i) for i in range(1, 1 + len(NEAR))))
     turning = RigidMotion((0.0, 1.0, 0.0), (0.5, 0.5, 0.0), frames, (0.0, *angles))

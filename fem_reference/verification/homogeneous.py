@@ -28,7 +28,7 @@ STEPS = {"first_step": 0.25, "residual": 1e-13}
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """The ``effects`` of a body, but its resistance to volume change, and their ``law`` of ``validation/``."""
+    """The ``effects`` of a body without its resistance to volume change, and their ``law`` of ``validation/``."""
 
     effects: tuple[Effect, ...]
     law: object
@@ -62,7 +62,7 @@ def everywhere(gradient: Matrix) -> tuple[Prescribed, ...]:
     return tuple(Prescribed(face, face, (0, 1, 2), Affine(gradient)) for face in SURFACE)
 
 
-# By name of a function of validation/homogeneous.py: what is prescribed for a stretch or an amount, and the face that is pulled.
+# By name of a function of validation/homogeneous.py: the prescribed motion for a stretch or an amount, and the face that is pulled.
 MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
     "uniaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch)), "x1"),
     "equibiaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch), stretched("y1", stretch)), "x1"),

@@ -29,13 +29,13 @@ def mass(factor: float = 1.0, spectral_radius: float = 0.9) -> Effect:
 
 
 def weight(axis: int, acceleration: float) -> Effect:
-    """Gravity along an axis [mm/s^2], at once."""
+    """Gravity along an axis [mm/s^2], applied at once."""
     at_once = [{"frame": 0.0, "amount": 1.0}]
     return make("gravity", density=DENSITY, acceleration=(acceleration * np.eye(3)[axis]).tolist(), ramp=at_once)
 
 
 def fallen(lab: Lab, factor: float) -> float:
-    """The fall [mm] of a free block, whose tangent has mass alone."""
+    """The fall [mm] of a free block; only its mass makes its tangent regular."""
     mesh = shapes.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     acting = (*neo_hooke(MU, 1e3 * MU), mass(factor), weight(2, -G))
     solved = lab.solve(Body(mesh, acting, (), frames(10, 10), interval=FALLING / 10), "P2/P1", **STEP)
@@ -81,7 +81,7 @@ def departure(lab: Lab, spectral_radius: float) -> Finding:
     return Finding(float(np.abs(total).max() / kinetic.max()), note=note)
 
 
-# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a way [mm], s being the share of so many frames.
+# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the share of all frames.
 FRAMES, WAY = 64, 1e-4 * LENGTH
 SMOOTH = Polynomial((0, 0, 0, 10, -15, 6))
 PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FRAMES))) for i in range(FRAMES + 1)))
@@ -96,7 +96,9 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The force of inertia over its limit for slow motion, by pulls that take twice as long: it is of order 2 in the speed."""
+    """The force of inertia over its limit for slow motion, by a ladder of pulls, each twice as long as the last: their error is of
+    order 2 in the speed.
+    """
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)

@@ -70,7 +70,7 @@ def top(pressures: Pressures) -> float:
 
 
 def pressed(lab: Lab, n: int, mu: float) -> float:
-    """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
+    """The mean stretch of the sphere's inner face, over its nodes, under a fluid of the pressure PRESSED in it."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, 2 * n, "tetrahedron", 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
     body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
@@ -212,7 +212,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LIMIT(
         name="inflation_limit_pressure",
-        title="A thick sphere blown up without end: the largest pressure that it bears",
+        title="A thick sphere blown up past its limit: the largest pressure that it bears",
         unit="MPa",
         given={**CELLS, "reading": LARGEST},
         **STRAIGHT,
@@ -223,7 +223,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LIMIT(
         name="inflation_limit_stretch",
-        title="A thick sphere blown up without end: the stretch of its inner radius where it bears the most pressure",
+        title="A thick sphere blown up past its limit: the stretch of its inner radius at the largest pressure",
         unit="1",
         given={**CELLS, "reading": WHERE_LARGEST},
         **RISING,
@@ -234,7 +234,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LIMIT(
         name="inflation_fall_beyond_limit",
-        title="A thick sphere blown up to 2.2 times its inner radius: how far its pressure has fallen from the largest",
+        title="A thick sphere blown up to 2.2 times its inner radius: the fall of its pressure from the largest",
         unit="MPa",
         given={**CELLS, "reading": FALL},
         **RISING,

@@ -18,7 +18,7 @@ loads = parts.find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
 LARGE = (100.0, 50.0, 60.0)  # of a block of muscle of 300 ml [mm]
-# Height of a soft column [mm], its bulk modulus [MPa] and its weight [N/mm3], by which it sinks by a tenth of its height.
+# Height of a soft column [mm], its bulk modulus [MPa] and its weight [N/mm3], under which it sinks by a tenth of its height.
 HEIGHT, SOFT, WEIGHT = 10.0, 5 * MU, 1e-3
 FLUID, COMPRESSIBLE = 0.1, 1.0  # a pressure, and the bulk modulus of the block that it shrinks [MPa]
 TILT = Turn((0.0, 1.0, 0.0), 0.3, (SIZE[0] / 2, SIZE[1] / 2, SIZE[2]))
@@ -141,7 +141,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="pressure_all_round",
-        title="Tilted block in a fluid that presses all round: what its two holders carry together",
+        title="Tilted block in a fluid that presses all round: the sum of the forces on both ends",
         unit="N",
         measure=left_over,
         given={"faces": parts.SURFACE},
@@ -171,7 +171,7 @@ ENTRIES: tuple[Entry, ...] = (
         0,
         "loads",
         "dead_pull",
-        "Block pulled by a dead force: how far it stretches",
+        "Block pulled by a dead force: its stretch",
         PULLED,
         "The force spread over the area as it is now.",
         loads=(make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=parts.ramp()),),

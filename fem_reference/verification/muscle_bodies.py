@@ -1,7 +1,7 @@
 """Idealised muscles beside measured ones: a vastus lateralis with its aponeurosis, and a ball pressed into a tibialis anterior.
 
 The material is the shipped one, chosen from other sources and never fitted to these. Shapes are idealised, and their sizes from
-memory or assumed, so that neither entry can validate. What the publications measured is in ``validation/experiments``.
+memory or assumed, so that neither entry can validate. The measurements of the publications are in ``validation/experiments``.
 """
 
 import math
@@ -95,7 +95,7 @@ class FittedOgden(Energy):
     mu: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
+        """The stiffness that this law gives the body at rest."""
         return Moduli(shear=self.mu)
 
     def energy(self, state: State) -> Any:

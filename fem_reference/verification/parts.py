@@ -1,6 +1,6 @@
 """Parts of entries: truths, negative controls, materials and constraints, and readings from the states of a body.
 
-The truths stand in ``validation/``: closed forms and published numbers, which know nothing of this package.
+The truths are in ``validation/``: closed forms and published numbers, which import nothing from this package.
 """
 
 import importlib
@@ -26,7 +26,7 @@ NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
 
 
 def find(name: str) -> ModuleType:
-    """The module ``validation/<name>.py``, wherever Python looks for modules.
+    """The module ``validation/<name>.py``, even where ``validation`` is not on Python's search path.
 
     >>> round(find("torsion").square_bar_stiffness(1.0, 1.0), 4)
     0.1406
@@ -64,7 +64,7 @@ def sliding(*faces: str) -> tuple[Prescribed, ...]:
     return tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in faces)
 
 
-# Along the axes the planes through the origin are those of mirrors.
+# The planes of symmetry: the coordinate planes through the origin.
 SYMMETRY = sliding("x0", "y0", "z0")
 
 

@@ -41,8 +41,8 @@ def turn(share: float) -> Turn:
 
 
 def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float) -> tuple[Frame, Frame]:
-    """A warped box before and after a turn of its ``faces``, z1 or the whole surface by ``further`` times as much: this in one
-    step, two ends in as many as it takes. Before, at frame 1, it is at rest or contracted, as its material is.
+    """A warped box before and after a turn of its ``faces``, z1 or the whole surface by ``further`` times as much. The surface
+    turns in one step, two ends in several. Before, at frame 1, the box is at rest, or contracted by its material.
     """
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], 1, BUMP)
     moved = SURFACE if faces == SURFACE else ("z1",)

@@ -73,11 +73,6 @@ def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
-def swapped(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """Two frames exchanged."""
-    return problem, replace(run, positions=run.positions[[0, 2, 1]])
-
-
 def missing(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """The last frame missing."""
     return problem, replace(run, positions=run.positions[:2], numbers=run.numbers[:2])
@@ -94,17 +89,12 @@ def moved(frame: int, place: Vector, by: Vector) -> Mistake:
     return mistake
 
 
-def pushed(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """The ball 3 mm farther than the bar was pressed: within it."""
-    return replace(problem, bones=bar("5 mm").bones), run
-
-
 MISTAKES = (
-    ("order", "two frames in each other's place", swapped),
+    ("order", "two frames exchanged", lambda it, run: (it, replace(run, positions=run.positions[[0, 2, 1]]))),
     ("frames", "its last frame missing", missing),
     ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
     ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
-    ("bone", "the ball 3 mm farther, within the bar", pushed),
+    ("bone", "the ball 3 mm farther, within the bar", lambda it, run: (replace(it, bones=bar("5 mm").bones), run)),
     ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
 )
 

@@ -52,8 +52,8 @@ def agreement(
 
 
 def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
-    """Between two states of a body: of node positions over the greatest displacement from ``rest`` (n, 3), and relative ones of
-    energies, and of forces and moments over their greatest.
+    """The relative differences between two states of a body: of node positions over the greatest displacement from ``rest`` (n, 3),
+    of energies, and of forces and moments over their greatest.
     """
     return {
         "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
@@ -71,7 +71,7 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
 def built(
     acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
 ) -> Body:
-    """A body whose ``acting`` effects stand beside a resistance to volume change; ``mesh`` by kind of its cells."""
+    """A body of the ``acting`` effects and a resistance to volume change; ``mesh`` by kind of its cells."""
     acting = (*acting, parts.resistance(element, 1.0))
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 

@@ -1,8 +1,8 @@
 """A block squeezed between plates: smooth ones, to a tenth of its height and back or until it collapses, and glued ones, until its
 corners fold over.
 
-Smooth plates leave every state homogeneous, also below half the height, where it is unstable: Newton's method follows it, as
-nothing on a structured mesh disturbs it. On the return path a load step that is too large finds another state without stress: the
+Smooth plates leave every state homogeneous, even below half the height, where it is unstable: Newton's method follows it, as a
+structured mesh does not disturb it. On the return path a load step that is too large finds another state without stress: the
 block turned by half a turn, through its planes of symmetry. That state is refused, as det F falls to 0 on the straight line to it.
 
 Where the bulk modulus is low, no state near the rest volume is left at some height. An isochoric neo-Hookean energy pulls at the
@@ -90,8 +90,8 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
 
 
 def collapses(lab: Lab, element: str, poisson: float) -> Finding:
-    """1 where the squeeze does not come through, keeps no state below a fifth of its volume, and names the law that was
-    outside its range; else 0. Newton's method finds a collapsed state or, on the steep branch towards it, which folds back, none.
+    """1 where the squeeze does not reach its end, keeps no state below a fifth of its volume, and names the law outside its range;
+    else 0. Newton's method finds a collapsed state or, on the steep branch towards it, which folds back, none.
     """
     solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
@@ -105,12 +105,6 @@ def outside(lab: Lab, element: str, poisson: float) -> Finding:
     solved = squeezed(lab, element, poisson, STRETCHES)
     found = sum(state.scalars["outside_law"] > 0 for state in (*solved.states[:-1], solved.last))
     return Finding(float(found), note=solved.outcome.message)
-
-
-def known_outside() -> int:
-    """The number of states with less than the ``LOWEST`` volume."""
-    volume = partial(loads.squeezed_volume, MU, bulk_modulus(POISSON))
-    return sum(volume(stretch) < LOWEST for stretch in STRETCHES)
 
 
 def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Run:
@@ -148,8 +142,7 @@ def stays_upright(lab: Lab, element: str, count: int, height: float, **settings:
 EXACT = "the state is homogeneous, so that every element has it: Newton's residual of 1e-11 N and rounding remain"
 BALANCE = "validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)"
 # A property that is there (1) or not (0).
-NOTHING_BETWEEN = "it is yes (1) or no (0), and nothing between"
-YES = partial(Entry, unit="1", truth=1.0, within=0.1, because=NOTHING_BETWEEN, kind="property")
+YES = partial(Entry, unit="1", truth=1.0, within=0.1, because="the answer is yes (1) or no (0)", kind="property")
 EXACTLY = partial(Entry, group="squeeze", within=1e-10, because=EXACT, kind="closed form", source=BALANCE)
 SMOOTH = partial(EXACTLY, negative_control="bulk modulus 1 % too small")
 UPRIGHT = "det F above zero everywhere, or material would go through itself"
@@ -168,12 +161,12 @@ ENTRIES: tuple[Entry, ...] = (
     Entry(
         name="law_outside_its_range",
         group="collapse",
-        title="In how many states of a squeeze, from 1 to 0.4 of the height, less than half of the volume is left, by Q1/P0",
+        title="The number of states with less than half of the volume in a squeeze from 1 to 0.4 of the height, by Q1/P0",
         unit="1",
         measure=outside,
         given={"element": "Q1/P0", "poisson": POISSON},
         **control("a Poisson ratio of 0.32", poisson=0.32),  # with which the volume stays above a half
-        truth=known_outside,
+        truth=lambda: sum(loads.squeezed_volume(MU, bulk_modulus(POISSON), at) < LOWEST for at in STRETCHES),
         within=0.1,
         because="it is a number of states, each of them homogeneous, so that every element has it",
         kind="closed form",
@@ -204,14 +197,14 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         SMOOTH(
             name=f"squeeze_return_{name}",
-            title=f"How far that block is from its rest state when the plates are back, K/mu = {bulk / MU:.0e}, {element}"
+            title=f"The distance of that block from its rest state when the plates are back, K/mu = {bulk / MU:.0e}, {element}"
             + (", in load steps that may grow" if growing else ""),
             unit="mm",
             measure=distance_from_rest,
             given={"element": element, "bulk": bulk, "growing": growing},
             **control("the plates stop a thousandth of their way before they are back", back=0.999),
             truth=0.0,
-            because=f"{EXACT}; of an elastic body nothing remembers the squeeze",
+            because=f"{EXACT}; an elastic body keeps no trace of the squeeze",
             kind="property",
             source="a hyperelastic body that nothing loads or moves is at rest",
         )

@@ -56,7 +56,7 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
     """The force [N] between the pressed blocks; their faces are two parts, or one that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
-    if itself:  # which feels nothing at rest
+    if itself:  # the blocks then begin beyond the smoothing, without pressure at rest
         (law,), facets = body.touching, body.mesh.facets
         mesh = replace(body.mesh, facets=facets | {"faces": np.concatenate([facets[law.one], facets[law.other]])})
         body = replace(body, mesh=mesh, touching=(replace(law, one="faces", other="faces"),))

@@ -230,7 +230,7 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
         bars = sorted((row[head.index(column)].removeprefix("± ").split()[0] for row in cases), key=float)
         assert stated[name].startswith(f"{bars[0]} to {bars[-1]} "), name
     bar, value, where = re.fullmatch(r"(\S+) of (\S+) kPa in the mean \((\w+)\)", stated["Stress"]).groups()
-    (said,) = [line for line in text.splitlines() if "mean stress along the fibres" in line]
+    (said,) = [one for one in text.split("\n\n") if "mean stress along the fibres" in one]
     assert f"{value} ± {bar} kPa" in said
     assert f"`{where}`" in said
     assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {

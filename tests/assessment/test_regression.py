@@ -42,7 +42,7 @@ def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
     # But for the rounding of positions in the file.
     assert moved.current == pytest.approx(2, abs=baseline.POSITION_ROUNDING)
     assert "2" in moved.why
-    assert "mm from what it was, 0.1 mm allowed" in moved.why
+    assert "mm from the baseline, 0.1 mm allowed" in moved.why
 
 
 def test_a_baseline_whose_positions_are_too_far_away_to_have_squares_fails(path) -> None:
@@ -89,7 +89,7 @@ def test_a_vertex_that_moves_between_the_sampled_ones_shows_in_the_statistics(pa
     check = checked(path, bumped)
     assert asked(check, "unchanged", "positions.moved").word == "pass"
     assert asked(check, "unchanged", "volume.deviation").word == "fail"
-    assert "no sampled vertex moved and yet measures changed" in check.notes[0]
+    assert "no sampled vertex moved, but measures changed" in check.notes[0]
 
 
 def test_a_statistic_worse_by_more_than_its_tolerance_fails_at_the_frame_that_is_worst(path) -> None:
@@ -118,7 +118,7 @@ def test_nothing_is_said_where_the_bar_reaches_both_sides_of_what_is_allowed(pat
     assert (judged.frame, judged.known) == (20, BAR)
     edited(path, lambda table: table["measures"][name].update(within=12.1))
     why = asked(checked(path, current(known=bars())), "within", name).why
-    assert why == "the reference has an error bar of 0.5 mm, and 12 mm is that near to the 12.1 mm allowed"
+    assert why == "the reference has an error bar of 0.5 mm, and 12 mm is within it of the 12.1 mm allowed"
 
 
 def test_an_edited_tolerance_below_rounding_says_nothing(path) -> None:
@@ -155,9 +155,9 @@ def test_a_number_that_does_not_exist_passes_nothing(tmp_path, none) -> None:
     assert json.loads(path.read_text())["measures"][name]["values"] == [0.0, None, 1.0]
     for question in ("unchanged", "within"):
         same = asked(checked(path, gap), question, name)
-        assert (same.word, same.why) == ("inconclusive", "there is no number, and there was none")
+        assert (same.word, same.why) == ("inconclusive", "there is no number now, and there was none before")
     appeared = asked(checked(path, current(known=bars(), measures=measured(one))), "unchanged", name)
-    assert (appeared.word, appeared.why) == ("fail", "there is a number now, and there was none")
+    assert (appeared.word, appeared.why) == ("fail", "there is a number now, and there was none before")
     baseline.update(path, current(known=bars(), measures=measured(one)))
     for lost in (gap, current(known=bars(), measures=())):
         for question in ("unchanged", "within"):
@@ -173,7 +173,7 @@ def test_notes_say_what_else_is_different(path) -> None:
     )
     assert "measured by fem_reference" in check.notes[0]
     assert check.notes[1] == "the reference is test, that of the baseline was fenicsx-1"
-    assert "no sampled vertex moved and yet measures changed" in check.notes[2]
+    assert "no sampled vertex moved, but measures changed" in check.notes[2]
 
 
 def test_a_vertex_that_is_not_there_is_named(path) -> None:

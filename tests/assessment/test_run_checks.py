@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from fem_reference import effects
 from fem_reference.assessment import second_check
-from fem_reference.assessment.run_checks import RunCheck, _give, of_body, of_muscle
+from fem_reference.assessment.run_checks import RunCheck, give, of_body, of_muscle
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.motion import RigidMotion as Turn
 from fem_reference.geometry.rigid_bodies import Sphere
@@ -86,7 +86,7 @@ def test_contact_gives_way_by_the_pressure_over_its_stiffness(tmp_path) -> None:
     for stiffness, given in ((1.0, 0.5), (10.0, 0.05)):
         contact = effects.make("contact", stiffness=f"{stiffness} MPa/mm", bones=("ball",))
         pressed = replace(problem, effects=(*problem.effects[:2], contact))
-        none, some = (_give(pressed, problem.bones[2], pressure, 1.0) for pressure in (0.0, 0.5))
+        none, some = (give(pressed, problem.bones[2], pressure, 1.0) for pressure in (0.0, 0.5))
         assert some - none == pytest.approx(given)
 
 

@@ -93,7 +93,7 @@ def test_where_none_is_good_enough_the_nearest_and_the_reason_are_named(bar, tmp
         bar, out, capsys, "--error", "2.5 mm", "--time", "10 ms", "--json", str(tmp_path / "found.json")
     )
     assert status == cli.VERDICT_FAIL
-    assert "none of 4 settings meets what is asked on bar" in text
+    assert "none of 4 settings meets the request on bar" in text
     # 0.02 of 50 mm and the bar of 2 mm: what was measured is below what is asked, and what is known is not.
     assert "the nearest: pbd: sweeps = 10" in text
     assert "at most 3 mm (1 mm measured, and 2 mm, the error bar of the truth), 10 ms a frame" in text
@@ -103,7 +103,7 @@ def test_where_none_is_good_enough_the_nearest_and_the_reason_are_named(bar, tmp
     assert found["nearest"]["choice"]["sweeps"] == 10
     assert (found["nearest"]["error"], found["nearest"]["bar"]) == (3.0, 2.0)
     status, text = said(bar, out, capsys, "--error", "1 mm")
-    assert (status, "known no better than 2 mm" in text) == (cli.VERDICT_FAIL, True)
+    assert (status, "known only to 2 mm" in text) == (cli.VERDICT_FAIL, True)
     status, text = said(bar, out, capsys, "--time", "0.5 ms")
     assert "the nearest: pbd: sweeps = 1" in text
 

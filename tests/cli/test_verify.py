@@ -113,7 +113,7 @@ def test_a_folder_that_cannot_be_written_into_is_refused_before_anything_is_meas
 ) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)  # the tests may run as root, who can write anywhere
     assert cli.main(["verify", "bars", "--out", str(verify.folder / "new")]) == cli.BAD_INPUT
-    assert "cannot be written into" in capsys.readouterr().err
+    assert "is not writable" in capsys.readouterr().err
     assert verify.made.lab.made == 0
     assert cli.main(["list", "--out", str(verify.folder / "new")]) == cli.DONE
 

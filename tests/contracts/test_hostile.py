@@ -290,4 +290,6 @@ def test_a_mistake_of_ours_is_no_verdict(
     assert cli.main(["list"]) == cli.BROKEN == 70
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "judged" in said if isinstance(error, MemoryError) else "no verdict" in said and "Please report it" in said
+    assert (
+        "judged" in said if isinstance(error, MemoryError) else "not a verdict" in said and "Please report it" in said
+    )

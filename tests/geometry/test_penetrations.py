@@ -117,6 +117,19 @@ def test_parts_of_a_bone_are_inside_however_many_there_are(count) -> None:
     assert [deep > 2 for deep in inner] == [bool(i % 2) for i in range(count)]
 
 
+@pytest.mark.parametrize("within", [False, True])
+def test_a_part_within_counts_beside_one_that_crosses(within: bool) -> None:
+    """A ball of 2 mm across the side of the body, and one 5 mm from its middle: up to 7 mm deep; outside only the first counts."""
+    ball, count = shapes.sphere(2, 2.0), len(shapes.sphere(2, 2.0).points)
+    middles = [(9.0, 0.0, 0.0), (-5.0 if within else -15.0, 0.0, 0.0)]
+    points = np.concatenate([ball.points + middle for middle in middles])
+    bone = Surface(points, np.concatenate([ball.triangles, ball.triangles + count]))
+    assert len(crossings(BODY, bone))
+    assert_allclose(
+        depths(BODY, bone, Sphere((100.0, 0, 0), 1.0), STILL).deepest()[0], 7.0 if within else 3.0, atol=0.15
+    )
+
+
 def deepest(body: Surface, radius: float, at) -> float:
     surface, form = ball(radius, at)
     return depths(body, surface, form, STILL).deepest()[0]

@@ -149,8 +149,7 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
     with caplog.at_level(logging.WARNING):
         mesh = tetrahedralise(dirty, 16.0, {"all": np.ones(dirty.triangles.shape)})
     assert (
-        "dirty.ply: fTetWild meshes it, differently each time, for gmsh cannot: 12 triangles pass through"
-        in caplog.text
+        "dirty.ply: meshed by fTetWild, differently each time, as gmsh cannot: 12 triangles pass through" in caplog.text
     )
     assert "dirty.ply: 12 triangles of the given surface intersect others" in caplog.text
     assert mesh.maker == "fTetWild"

@@ -78,6 +78,34 @@ def test_arms_about_an_axis_are_those_of_the_reference_and_a_pose_that_was_not_r
     assert row == "| `hip` | 32.0 (29.0 to 34.0) | 62.0 (59.0 to 64.0) | diverged |"
 
 
+def test_the_choice_of_fibres_has_bars_of_changes_and_of_the_fibres_as_shipped_alone(monkeypatch) -> None:
+    """A deviation has another bar than a change, and other fibres belong to the second place of each cell."""
+    arms = {"mean": 2.0, "least": -1.0, "greatest": 4.0}
+    own = [("moment_arm", name, frame, value + frame) for name, value in arms.items() for frame in (0, 50)]
+    own.append(("fibre_length", "mean", 50, -3.0))
+    bars = [("fibre_length", "mean", 50, 0.5), ("moment_arm", "mean", 50, 0.25)]
+    keys = ("metric", "statistic", "frame", "value")
+
+    def run(length: float, off: float, own_bars: list[tuple[str, str, int, float]]) -> dict[str, object]:
+        shown = [{"candidate": who, **dict(zip(keys, (*key, value + by), strict=True))}
+                 for who, by in (("reference", off), ("pbd", 99.0)) for *key, value in own]  # fmt: skip
+        known = [{"of": of, **dict(zip(keys, (*key, value + by), strict=True))}
+                 for of, by in (("change", 0.0), ("deviation", 9.0)) for *key, value in own_bars]  # fmt: skip
+        mesh = {"fibre_length_mean_mm": length}
+        return {"status": "converged", "mesh": mesh, "measures": shown, "error_bars": known}
+
+    first, other = measurements.MEASUREMENTS["fibre_choice"].cases[:2]
+    assert first.startswith("hip_flexion --error-bar")
+    keep = measurements.MEASUREMENTS["fibre_choice"].keep
+    kept = {"measured": keep({first: run(180.0, 0.0, bars), other: run(190.0, 1.0, [])})}
+    monkeypatch.setattr(measurements, "kept", lambda _: kept)
+    monkeypatch.setattr(measurements, "origin", lambda _: "here")
+    row = measurements.TABLES["fibre_choice"]().splitlines()[2]
+    cells = ("`hip_flexion`", "potential / by area", "180.0 / 190.0", "-3.0 ± 0.5 / -2.0")
+    arms_shown = ("2.0 (-1.0 to 4.0) / 3.0 (0.0 to 5.0)", "52.0 ± 0.25 (49.0 to 54.0) / 53.0 (50.0 to 55.0)")
+    assert row == "| " + " | ".join((*cells, *arms_shown)) + " |"
+
+
 def test_every_solver_has_as_many_hard_cases() -> None:
     found = measurements.kept("stress")["measured"]
     assert len({sum(count for count in one.values() if isinstance(count, int)) for one in found["counts"]}) == 1

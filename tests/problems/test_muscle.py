@@ -275,7 +275,7 @@ def test_a_shifted_attachment_moves_the_clamped_area_and_not_the_fibres(bar) -> 
 @pytest.mark.slow
 def test_a_vertex_has_one_bone(bar) -> None:
     scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
-    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment has"):
+    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which belongs to another attachment"):
         muscle.setup(scene)
 
 

@@ -81,7 +81,7 @@ def test_the_shipped_plates_are_the_report_s() -> None:
             r"where: got .* on an interval",
         ),
         ({"boundary": []}, r"boundary: got no value anywhere and no reaction"),
-        ({"boundary": [{"on": "rim", "value": 0}]}, r'boundary\[0\]\.on: got "rim", where there is nothing'),
+        ({"boundary": [{"on": "rim", "value": 0}]}, r'boundary\[0\]\.on: got "rim", which has no facets'),
         (
             {"boundary": [{"on": "left", "value": "1/x"}]},
             r'boundary\[0\]\.value: got "1/x", which has no finite value at \(0\)',
@@ -116,7 +116,7 @@ def test_scenes_that_are_not_usable(tmp_path, tables, match) -> None:
         ("triangles.csv", "1,2,4\n", "got a cell with a vertex outside of 1 to 3"),
         ("bounds.csv", "1,2\n", "bounds.csv: got 1 rows"),
         ("bounds.csv", "1,4\n0,0\n", "bounds.csv: got vertices 1 to 4, want 1 to 3"),
-        ("more.csv", "1\n2\n", "more.csv: got other values than another file of bounds has"),
+        ("more.csv", "1\n2\n", "more.csv: got values unlike those of another file of bounds"),
         ("bounds.csv", "1,1\n0,1\n", "bounds.csv: got a vertex named twice"),
     ],
 )

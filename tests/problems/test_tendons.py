@@ -56,7 +56,9 @@ def test_a_tendon_of_nothing_is_refused() -> None:
     with pytest.raises(InputError, match=r'Tendon on top: got the attachment "top" without a tendon, want landmarks'):
         springs(bar(None), TENDON)
     reaching = Polylines(LINES.points[:2], LINES.offsets[:2])
-    with pytest.raises(InputError, match="Tendon on top: got no fibre that continues as it, want fibres that end"):
+    with pytest.raises(
+        InputError, match="Tendon on top: got no fibre that continues as this tendon, want fibres that end"
+    ):
         springs(bar(), TENDON, lines=reaching)
     with pytest.raises(InputError, match=r"Tendon on top\.reach: got 0\.1 mm, within which no triangle is free"):
         springs(bar(), make("tendon", on="top", stiffness="20 N/mm", reach="0.1 mm"))

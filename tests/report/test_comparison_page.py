@@ -49,7 +49,7 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
 
 
 def test_how_well_the_reference_is_known_is_reported(comparison):
-    assert "With <code>--error-bar</code> the reference is solved" in html(comparison)
+    assert "With <code>--error-bar</code> the reference is also solved" in html(comparison)
     text = html(with_bars(comparison))
     # The bands of the model stand beside the numerical bars of what is in the headline, and without bars too.
     for whole in (text, html(comparison)):
@@ -144,7 +144,7 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     nowhere = replace(failed, positions=np.full_like(positions, NAN))
     apart = {"quick": measured(quick, nowhere.positions)}
     text = html(replace(one, reference=nowhere, deviations=apart))
-    assert "No frame was reached, so that nothing could be measured against it." in text
+    assert "No frame was reached, so nothing could be measured against it." in text
     assert "Deviations at their worst frames" not in text
     assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     assert "<h2>Cost</h2>" in text

@@ -45,7 +45,7 @@ def test_the_first_thing_said_is_what_is_validated_and_what_is_not(tmp_path) -> 
 def test_what_it_says_in_a_line() -> None:
     """Measurements apart from other models."""
     said = "4 quantities: 1 validated, 1 indicative, 1 outside, 1 verified only; 5 of 6 measurements within their uncertainty, "
-    assert credibility_page.said(found()) == said + "0 of 1 other models as near as asked for"
+    assert credibility_page.said(found()) == said + "0 of 1 other models within the tolerance"
 
 
 def test_measurements_and_other_models_are_counted_apart(tmp_path) -> None:
@@ -54,7 +54,7 @@ def test_measurements_and_other_models_are_counted_apart(tmp_path) -> None:
     assert (row["measurement"], row["model"]) == ({"met": 2, "of": 3}, {"met": 0, "of": 1})
     assert [one["kind"] for one in row["beside"]] == ["measurement"] * 3 + ["model"]
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text())
-    assert "2 of 3 measurements within their uncertainty; 0 of 1 other models as near as asked for" in text
+    assert "2 of 3 measurements within their uncertainty; 0 of 1 other models within the tolerance" in text
     assert "converged in 9 evaluations from one start" in text
 
 

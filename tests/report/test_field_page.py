@@ -61,7 +61,7 @@ def test_a_run_that_is_not_a_number_is_reported_and_not_drawn(tmp_path, make):
     read(text)
     assert "it blew &lt;up&gt;" in text
     assert '<span class="bad">not a number</span>' in text
-    assert "the listing is not a number, so that they cannot be compared" in text
+    assert "the listing is not a number, so they cannot be compared" in text
     assert text.count("nothing to draw") == (0 if make is rod else 2)
 
 
@@ -71,7 +71,7 @@ def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
     alone = replace(lost, reference=reference, candidates=(), deviations={}, verdicts=(), ladders=(LADDERS[1],))
     text = field_page.comparison_page(alone).html()
     read(text)
-    assert "there is a reference alone" in text
+    assert "there is only a reference" in text
     assert "No run has values that are numbers" in text
     assert "Expectations" not in text
     assert "not a number" not in text[text.index("<h3>Runs") : text.index("<h3>Convergence")]
@@ -86,7 +86,7 @@ def test_the_first_sentence_says_how_far_listing_and_equation_part(tmp_path):
     minus = "\N{MINUS SIGN}"
     assert field_page.apart(other) == (
         f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; at the furthest vertex they differ by 4, "
-        "2 times as far as the equation's solution gets from zero."
+        "2 times the greatest value of the equation's solution."
     )
 
 

@@ -110,8 +110,8 @@ def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
         )
         assert f"reference: doubtful, {why}" in printed
         assert '<span class="badge doubtful">doubtful pass</span>' in row(tmp_path, "reference")
-        assert "Doubtful: \N{MINUS SIGN}13.5 % of the energy came or went without work" in page
-    assert "by Simpson's, with a state halfway" in page
+        assert "Doubtful: \N{MINUS SIGN}13.5 % of the energy appeared or vanished without work" in page
+    assert "by Simpson's rule with a state halfway" in page
 
 
 def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: Path, capsys) -> None:

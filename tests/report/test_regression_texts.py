@@ -44,7 +44,7 @@ def test_junit_has_a_case_for_each_judgement(mixed) -> None:
     assert len({(case.get("classname"), case.get("name")) for case in cases}) == len(cases)
     assert cases[0].get("name").endswith(" within"), "what is worse comes before what is other"
     (moved,) = (case for case in cases if case.get("name") == "positions.moved unchanged")
-    assert moved.find("failure").get("message") == "frame 20: 3 mm from what it was, 0.1 mm allowed"
+    assert moved.find("failure").get("message") == "frame 20: 3 mm from the baseline, 0.1 mm allowed"
     assert suite.find("system-out") is None
 
 
@@ -95,16 +95,16 @@ def test_markdown_shows_the_worst_first_and_is_short(mixed) -> None:
 
 def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     lines = regression_texts.text(mixed).splitlines()
-    assert "fail: positions.moved unchanged at frame 20: 3 mm from what it was, 0.1 mm allowed" in lines
+    assert "fail: positions.moved unchanged at frame 20: 3 mm from the baseline, 0.1 mm allowed" in lines
     away = [line for line in lines if "surface_deviation.max unchanged" in line]
     assert away[0].endswith("mm, further from the reference")
-    assert any(line.startswith("what is nearer to the reference and what is further: compare ball") for line in lines)
-    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is that near to the 0.1 mm allowed"
+    assert any(line.startswith("to see which statistics are nearer or further away: compare ball") for line in lines)
+    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is within it of the 0.1 mm allowed"
     assert f"{unknown} (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
     assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS
-    assert "and 5 more like the last, which --json and --junit name" in regression_texts.text(many)
+    assert "and 5 more like the last, listed by --json and --junit" in regression_texts.text(many)
 
 
 def test_facts_are_json(mixed) -> None:

@@ -16,11 +16,11 @@ def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> N
     first, inside, undecided, outside = uncertainty_page.sentences(study(SURFACE, band()))
     assert first == (
         "In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within 2 mm of this case's, rms, "
-        "where the reference itself is known to 0.100 mm. Most of it is by mooney_rivlin c1 (70 % of the variance)."
+        "where the reference itself is known to 0.100 mm. Its main cause is mooney_rivlin c1 (70 % of the variance)."
     )
-    assert inside == "Candidates whose surface errs less than the unknown parameters move it: fast."
-    assert undecided.endswith("with the error bar of the reference: near.")
-    assert outside == "Candidates whose surface errs more than the unknown parameters move it: far."
+    assert inside == "Candidates whose surface error is smaller than the effect of the unknown parameters: fast."
+    assert undecided.endswith("given the error bar of the reference: near.")
+    assert outside == "Candidates whose surface error is larger than the effect of the unknown parameters: far."
 
 
 def test_a_candidate_without_an_answer_is_not_called_outside() -> None:

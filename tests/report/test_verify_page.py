@@ -96,7 +96,7 @@ def test_an_entry_without_a_truth_is_reported() -> None:
 
 def test_negative_controls_are_marked() -> None:
     text = verify_page.page(verification(made(value=4.0, with_negative_control=True), made("tip"))).html()
-    assert "1 entry is measured with one thing wrong on purpose" in text
+    assert "1 entry is measured with a deliberate mistake" in text
     assert text.count('<small class="bad">negative control</small>') == 1
     assert '<p class="alarm"><b>Negative control:</b> mu twice</p>' in text
     assert text.count("<b>Its negative control:</b>") == 1

@@ -265,7 +265,7 @@ def test_the_stable_time_step_at_great_damping(damping) -> None:
 
 def test_another_clock_than_the_scenes_is_reported() -> None:
     outcome, _ = solved(replace(bar(BEND), interval=0.5))
-    assert outcome.message.endswith("; from a frame number to the next it takes 0.02 s, the scene 0.5 s")
+    assert outcome.message.endswith("; its interval between frame numbers is 0.02 s, that of the scene 0.5 s")
     assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message
 
 

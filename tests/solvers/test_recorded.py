@@ -264,7 +264,7 @@ def test_two_indices(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["absent", "absent.pvd", "mesh_0.ply"])
 def test_no_sequence(tmp_path: Path, name: str) -> None:
     save(tmp_path / "mesh_0.ply", moved(0))
-    refuse(tmp_path / name, rf"{name}: got none of them, want a folder, or a \.pvd or \.xdmf file")
+    refuse(tmp_path / name, rf"{name}: got another kind of file, or nothing, want a folder, or a \.pvd or \.xdmf file")
 
 
 def test_an_index_of_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_calls_with_what_they_do_not_want_are_refused(tmp_path) -> None:
     run = fr.solve(case, "pbd", store=tmp_path / "runs")
     (tmp_path / "file").write_text("")
     calls = {
-        'settings nonsense: got no solver, want the name of the solver that they are of, such as solver="fenicsx"': (
+        'settings nonsense: got no solver, want the name of their solver, such as solver="fenicsx"': (
             lambda: fr.solve(case, nonsense=3)
         ),
         "solver: got int 3, want the name of a solver": lambda: fr.solve(case, 3),

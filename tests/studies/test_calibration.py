@@ -31,11 +31,8 @@ def data(folder: Path, *rows: str) -> Path:
     return folder / "data.csv"
 
 
-@pytest.mark.slow
-def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path: Path) -> None:
-    """Forces of a bar of 11 kPa with 1 % of noise: five rows about the same slope know it to 1 % / sqrt(5) and a t factor of 2.8.
-    Of two matrices in parallel only the sum acts, mu + 2 c1.
-    """
+def noisy_forces(case: MuscleCase, tmp_path: Path) -> Path:
+    """Forces of the bar with a modulus of 11 kPa and 1 % of noise, in five rows."""
     truth = shared_bench(unknowns(case).at({MU: 0.011}), tmp_path / "runs").reference()
     noise = 1 + 0.01 * np.random.default_rng(4).standard_normal(5)
     forces = np.linalg.norm(truth.force("lid"), axis=1)
@@ -46,7 +43,13 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     ]
     if truth.force("lid")[4, 2] < 0:
         rows[-1] = rows[-1].replace(".z,", ".z,-")
-    path = data(tmp_path, *rows)
+    return data(tmp_path, *rows)
+
+
+@pytest.mark.slow
+def test_a_modulus_comes_back_from_its_own_noisy_forces(case: MuscleCase, tmp_path: Path) -> None:
+    """Five rows about the same slope know it to 1 % / sqrt(5) and a t factor of 2.8."""
+    path = noisy_forces(case, tmp_path)
     found = calibrate(case, path, [MU], tmp_path / "runs", Workers())
     (mu,) = found.estimates
     assert mu.low < 0.011 < mu.high
@@ -57,6 +60,14 @@ def test_moduli_come_back_from_their_own_noisy_forces(case: MuscleCase, tmp_path
     called = fr.calibrate(case, str(path), ["effect.0.mu"], store=tmp_path / "runs", progress=lines.append)
     assert called == found, "the call of the package is the same, from stored runs"
     assert any("solved before" in line for line in lines)
+
+
+@pytest.mark.nightly  # by a law alone it is asked by day in tests/assessment/test_calibration.py
+@pytest.mark.slow
+def test_of_two_matrices_in_parallel_only_the_sum_is_known(case: MuscleCase, tmp_path: Path) -> None:
+    """The sum is mu + 2 c1."""
+    path = noisy_forces(case, tmp_path)
+    found = calibrate(case, path, [MU], tmp_path / "runs", Workers())
     both = calibrate(case, path, [MU, C1], tmp_path / "runs", Workers())
     ((one, other, correlation),) = both.pairs
     assert (one, other) == ("neo_hooke mu", "mooney_rivlin c1")

@@ -121,14 +121,23 @@ def errors_of(study: cost.Study) -> dict[str, dict[str, float]]:
     return {f"{point.name} {point.label}": point.errors for point in study.points}
 
 
-def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> None:
-    folder = scene_in(tmp_path).folder
+def studied_alone(tmp_path: Path, other: str) -> cost.Study:
+    """The study by one process; its truth is stored for the study in the folder ``other`` too."""
     alone = cost.study([scene_in(tmp_path)], tmp_path / "alone" / "runs", Workers(), ONLY)
     assert len(errors_of(alone)) > 5
-    for other in ("two", "cut"):  # the truth is the same for all
-        shutil.copytree(tmp_path / "alone" / "runs", tmp_path / other / "runs", ignore=shutil.ignore_patterns("pbd-*"))
+    shutil.copytree(tmp_path / "alone" / "runs", tmp_path / other / "runs", ignore=shutil.ignore_patterns("pbd-*"))
+    return alone
+
+
+def test_a_point_is_the_same_alone_and_with_workers(tmp_path) -> None:
+    alone = studied_alone(tmp_path, "two")
     together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ONLY)
     assert errors_of(together) == errors_of(alone)
+
+
+@pytest.mark.nightly  # by day tests/contracts/test_survival.py kills a run
+def test_a_point_is_the_same_after_a_kill(tmp_path) -> None:
+    alone, folder = studied_alone(tmp_path, "cut"), scene_in(tmp_path).folder
     line = command(
         "-m", "fem_reference", "study", str(folder), "--solver", "pbd", "--out", str(tmp_path / "cut"), "--quiet"
     )

@@ -108,7 +108,7 @@ def test_a_muscle_in_inches_is_not_taken_for_one_in_centimetres(tmp_path: Path, 
     assert made(tmp_path, bodies(tmp_path, {"muscle": 25.4})) == cli.BAD_INPUT
     said = capsys.readouterr().err
     assert 'a muscle in cm or in; "low.stl" is 303 long, a bone in mm' in said
-    assert "no unit is one of all of them" in said
+    assert "no unit suits all of them" in said
     assert not (tmp_path / "mine").exists()
 
 

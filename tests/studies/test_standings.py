@@ -121,7 +121,7 @@ def test_a_submission_is_never_the_reference_whatever_it_says(place) -> None:
     submit(place / "mine", name="reference")
     found = stand("--submission", "mine")
     assert [row["name"] for row in found["rows"]] == ["reference"]
-    assert "the name of a solver of ours" in found["missing"]["bar, reference"]
+    assert "the name of one of our solvers" in found["missing"]["bar, reference"]
 
 
 def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) -> None:
@@ -155,7 +155,7 @@ def test_a_submission_is_of_one_case_as_it_was_published(place, capsys) -> None:
     assert f'got "of another one", want "{key}"' in stand("--submission", "mine")["missing"]["bar, mine"]
     submit(place / "mine", case="baar", seconds_per_frame="")
     found = stand("--submission", "mine")
-    assert found["missing"] == {"baar, mine": "this case is not asked, only bar"}
+    assert found["missing"] == {"baar, mine": "this case is not solved here, only bar"}
     submit(place / "mine", name="still")
     assert cli.main(["standings", "./bar", "--program", "still", "--submission", "mine"]) == cli.BAD_INPUT
     assert "still: got two solvers of this name on a case" in capsys.readouterr().err

@@ -63,6 +63,7 @@ def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
     assert list(found.missing) == ["bar"]
 
 
+@pytest.mark.nightly  # by day tests/studies/test_refinement.py asks the same of a bar
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
 def test_coarse_tetrahedra_of_the_shipped_muscle_are_known_no_better_than_they_are(tmp_path) -> None:
     """Before contact, ``hip_flexion`` at 14 mm deviates from finer solutions by 0.084 and 0.115 mm, rms."""

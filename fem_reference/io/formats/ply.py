@@ -41,7 +41,7 @@ def _read(path: Path) -> Soup:
 
 
 def _element(body: bytes, count: int, properties: list[list[str]], types: dict[str, str]) -> tuple[Any, bytes]:
-    """The table of an element and what follows it; the first row states how long its lists are."""
+    """The table of an element and the bytes after it; the first row states the length of its lists."""
     fields: list[tuple[Any, ...]] = []
     for *kind, name in properties:
         if kind[0] == "list":

@@ -13,12 +13,12 @@ from fem_reference.report.drawings import REFERENCE, Drawing, drawn
 from fem_reference.report.words import under_load, words
 from fem_reference.runs.store import Run
 
-# Scalars of a run that a frame took, and their words.
+# Scalars of a run that are costs of a frame, and their words.
 _BY_FRAME = {
     "seconds_processor": "processor time [s]",
     "newton_iterations": "Newton iterations",
     "cut_backs": "cut-backs",
-    "contact_points_near": "points asked for their distance to bones",
+    "contact_points_near": "points checked for contact",
     "contact_points": "points in contact",
 }
 

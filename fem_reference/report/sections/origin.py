@@ -33,14 +33,14 @@ def changes(case: Case) -> list[tuple[str, Any, Any]]:
     try:
         in_file = dict(_flat(_table(casefile.read(case.place))))
     except InputError as error:
-        return [("the scene file", "not readable any more", str(error))]
+        return [("the scene file", "no longer readable", str(error))]
     here = dict(_flat(_table(case)))
     changed = [key for key in in_file | here if in_file.get(key) != here.get(key)]
     return [(key, in_file.get(key, ""), here.get(key, "")) for key in changed]
 
 
 def _table(case: Case) -> dict[str, Any]:
-    """The case as nested tables, entries of a list by their number; with all effects of its file where it chose among them."""
+    """The case as nested tables, with list entries by number, and with all effects of its file even where it chose among them."""
     effects = [one.effect for one in case.decisions] or case.effects
     listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
     listed |= {"choice": "auto"} if case.decisions else {}

@@ -24,15 +24,15 @@ _PARTS = 16
 
 
 class FrameModel(Protocol):
-    """A model of a muscle that advances from frame number to frame number; the loop adds to its ``cost``, and gives its ``advice``
-    for a run that ends in trouble.
+    """A model of a muscle that advances from frame number to frame number; the loop adds to its ``cost``, and ends the message of a
+    failed run with its ``advice``.
     """
 
     cost: dict[str, float]
     advice: str
 
     def move(self, number: int, /) -> None:
-        """Advance to the frame ``number``; the time of this counts as solving."""
+        """Advance to the frame ``number``; this time counts as solving."""
 
     def trouble(self) -> Trouble | None:
         """The trouble with the present state; None without."""
@@ -46,7 +46,7 @@ class FrameModel(Protocol):
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
     """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
-    parts; the model sees the bones at their ends. ``sink`` gets the frames. *Out of steps* where bones move too far in between.
+    parts, at whose ends the model sees the bones. ``sink`` gets the frames. *Out of steps* where bones move too far in a part.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:
@@ -110,9 +110,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. First it solves one
-    frame of a tetrahedron, with ``quick`` settings where there are some: this calls every compiled function, in
-    ``seconds_compile``.
+    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before that it solves
+    a frame of a tetrahedron, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
     """
     begin = time.perf_counter()
     first = make(tetrahedron(), quick or settings)
@@ -156,7 +155,7 @@ class MovingSurface:
         return Frame(number, self.points.copy())
 
     def ending(self) -> Outcome:
-        """Converged: every iteration counts as such."""
+        """Converged, as no iteration fails."""
         return Outcome("converged", f"{self.setup.frames[-1] - self.setup.frames[0]} iterations")
 
 
@@ -170,4 +169,4 @@ def other_clock(setup: Setup, frame_time: float) -> str:
     """A note where the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
-    return f"; from a frame number to the next it takes {frame_time:g} s, the scene {setup.interval:g} s"
+    return f"; its interval between frame numbers is {frame_time:g} s, that of the scene {setup.interval:g} s"

@@ -22,7 +22,7 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 # Thelen 2003, young adults: width of the active curve; shape of the passive one and its strain at F0; the strain of the tendon at
 # F0; the greatest force of lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape, at a strain from where a line of the same slope leads on (same place).
+# The tendon's toe ends at this share of F0, with this shape; from its end strain a line of the same slope follows (same source).
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
@@ -49,7 +49,7 @@ class Hill(Record):
 
     @property
     def thickness(self) -> float:
-        """The distance [l0] between the two layers that fibres join, which stays."""
+        """The constant distance [l0] between the two layers that the fibres connect."""
         return math.sin(self.pennation)
 
     def cosine(self, fibre: float) -> float:
@@ -73,7 +73,7 @@ class Hill(Record):
         if self.tendon_force(path, low) == 0:
             return 0.0, low
         high = min(self._fibre(path, -_SLACK), _LONGEST)
-        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # where the tendon pulls more than fibres can
+        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # where the tendon pulls harder than fibres can
         lengths = np.linspace(low, high, 2 + int((high - low) / _STEP))
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
@@ -108,7 +108,7 @@ class Hill(Record):
             return [-self.velocity(path, float(fibre[0]), activation)]
 
         lengths = [first]
-        for start, end in pairwise(times):  # each with its own slopes
+        for start, end in pairwise(times):  # the slopes of paths and activations differ between intervals
             found = scipy.integrate.solve_ivp(
                 rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance
             )
@@ -118,10 +118,10 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as Hill-type muscles with tendons, in equilibrium at each frame (5.1): all alike, and together of a ``max_force``.
+    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: that of all together.
 
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just slack;
-    ``pennation``: their angle; ``activation``: from 0 to 1.
+    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just
+    slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
     """
 
     max_force: Force

@@ -29,12 +29,11 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of every fibre that moves with a ``bone``: where it is at rest ``at`` this share of the fibre's length.
+    """A point of every fibre that moves with a ``bone``; at rest it is ``at`` this share of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass the point; at others they leave it out.
-    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them cubics whose slopes are those
-    of parabolas through neighbours, as Catmull and Rom have them, whatever the axes of the scene; beyond them the nearest. ``at``
-    is then its place among the points alone.
+    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them Catmull-Rom splines, whose
+    slopes are those of parabolas through neighbours; beyond them the nearest position. ``at`` then only orders the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]

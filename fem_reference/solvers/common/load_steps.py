@@ -35,8 +35,8 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Step:
-    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. The ``last`` attempt
-    describes how it ended; the last good state is ``at`` a frame; ``size`` is that of the next load step.
+    """The steps to a requested ``frame``: load steps, Newton iterations and cut-backs since the previous one; the ``last`` attempt;
+    the frame ``at`` which the last converged state is; the ``size`` of the next load step.
     """
 
     frame: float
@@ -72,8 +72,8 @@ def march(
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (at rest, or where the run continues) through every frame. ``attempt`` solves at a load from the last
     converged state, and must restore that state where it fails. A frame whose earlier state ``recall`` can take up needs no step.
-    Before giving up, the loop asks ``last_resort`` for another way to solve; where it returns True, load steps begin again.
-    Ends after the first frame that cannot be reached.
+    Before giving up, the loop asks ``last_resort`` to change the solution method; if it returns True, load steps begin again.
+    The loop ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -84,7 +84,7 @@ def march(
             if goal == frame and recall(frame):
                 at = goal
             while at < goal:
-                left = goal - at  # in steps of equal size near to ``step``: none is a sliver
+                left = goal - at  # in equal steps of about ``step``: none is tiny
                 size = left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
                 then = goal if size == left else at + size
                 result = attempt(then)

@@ -23,12 +23,12 @@ UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "
 CONVENTIONS = {
     "axes": "those of the surfaces of the case, right-handed",
     "indices": "from 0",
-    "poses": "4 x 4, row by row: [x, y, z, 1] as a column at rest, times the matrix from its left, is where it is at the frame",
+    "poses": "4 x 4, row by row: the matrix times the column [x, y, z, 1] at rest is the position at the frame",
 }
 
 
 def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
-    """Every file of the export of a ``problem`` but those that explain it, into ``folder``; ``of``: facts that name its case."""
+    """Write the export of a ``problem``, except its documentation, into ``folder``; ``of``: facts that identify its case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
@@ -72,7 +72,7 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
 
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that no mesh file has: units, conventions, frames, bones, attachments, names of regions (their shares are in the
+    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (their shares are in the
     files of tets), effects with the unit of every parameter.
     """
     contact = problem.contact

@@ -1,4 +1,4 @@
-"""Programs of other people as subprocesses: their time and memory, a limit, and an end that takes their own processes along."""
+"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of all processes that they start."""
 
 import os
 import shutil
@@ -16,12 +16,11 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# Clock time that may pass, as a multiple of a limit of processor time: beyond it the machine is too busy, or the program waits.
+# Limit of clock time over that of processor time: beyond it the machine is too busy, or the program waits.
 CLOCK = 10
-# Time [s] between two looks at a program, at least and at most; in between a share of the time that it takes.
-_GLANCES = (0.05, 1.0)
-_SHARE = 0.05
-_TAIL = 4096  # bytes of what it prints that are read
+# Time [s] between two looks at a program: this share of its time so far, but at least and at most these.
+_SHARE, _GLANCES = 0.05, (0.05, 1.0)
+_TAIL = 4096  # bytes that are read from the end of its output
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Ended:
 
 
 def found(word: str, directory: Path) -> Path | None:
-    """The file of a program that is called ``word`` in a ``directory``: there where it has a slash, else on the PATH."""
+    """The file of a program called ``word``: in the ``directory`` if the word has a slash, else on the PATH."""
     path = shutil.which(str(directory / word) if os.sep in word else word)
     return None if path is None else Path(path)
 
@@ -98,8 +97,8 @@ def _kill(process: int) -> None:
 
 
 class _Watch:
-    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason where it did; ``memory`` [MB]:
-    the greatest peak of its processes (that of the system begins with the memory of the process that starts them).
+    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason if it did; ``memory`` [MB]: the
+    greatest peak of its processes (the peak in ``os.wait4`` begins with the memory of the process that starts them).
     """
 
     def __init__(self, process: int, limit: float) -> None:

@@ -19,8 +19,8 @@ Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 # Solves a problem of one type: sinks every requested frame as it is reached. A physical failure is a status with a sentence, never
 # an exception; earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
 type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
-# Solves so from the last stored frame with enough state, which need not be the last of all, else from the first; ends as the run
-# would have ended that was cut off.
+# Continues a run that was cut off: from the last stored frame with enough state, which need not be the last, else from the first;
+# ends as the run would have ended.
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
 # Raises InputError below a place where the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
@@ -61,7 +61,7 @@ class Solver[P, S: Record]:
     go_on: GoOn[P, S] | None = None
 
     def record(self, given: Mapping[str, Any], place: str) -> type[S]:  # noqa: ARG002
-        """The record of settings that are ``given`` at a ``place``: always the same, unless they say which ones there are."""
+        """The type of the settings ``given`` at a ``place``: always the same, unless the given ones add keys."""
         return self.settings
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
@@ -79,8 +79,8 @@ class Solver[P, S: Record]:
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``:
     for a solver that simulates the effects of a scene, else None; ``fibres``: True where a surface solver needs fibres under such
-    settings. Without them it receives a ``Setup``, as the muscle is not filled for it. ``depends_on``: what its answer depends on
-    although the scene is the same: the order of vertices, or the size, by lengths or times of its own.
+    settings. Without them it receives a ``Setup``, as the muscle is not filled for it. ``depends_on``: the order of vertices or
+    the size of the muscle, if these alone change its answer.
     """
 
     task = "solve"

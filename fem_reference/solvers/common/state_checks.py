@@ -1,4 +1,4 @@
-"""Checks that a body can be in a state, made in order; the first that finds trouble ends the run."""
+"""Checks of the state of a body, made in order; the first that finds trouble ends the run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, enclosed_volume
 from fem_reference.runs.contents import Status
 
-# A body this many times as wide as at rest, or as its attached part, is lost.
+# A body this many times as wide as at rest, or as its attached part, has diverged.
 _WIDE = 10.0
-# A body of this many times its volume is lost too. Flesh keeps its volume within a few percent, and a surface that keeps only its
-# dihedral angles was seen at twice its volume; a wrong root or scaling has no such bound. A body that the bones draw out to n
-# times its length may have n times that.
+# A body of this many times its volume has diverged too. Flesh keeps its volume within a few percent, and a surface that keeps only
+# its dihedral angles reached twice its volume; a wrong root or scaling has no such bound. A body that the bones stretch to n times
+# its length may have n times that.
 _LARGE = 5.0
 
 

@@ -25,7 +25,7 @@ _TOUCHES = 1e-6
 
 
 class Ellipsoid(Record):
-    """An ellipsoid about ``centre`` whose half axes are ``radii``, along x, y, z before it is turned by the vector ``turn``."""
+    """An ellipsoid about ``centre`` with half axes ``radii`` along x, y, z, rotated by the rotation vector ``turn``."""
 
     centre: Point
     radii: tuple[PositiveLength, PositiveLength, PositiveLength]
@@ -33,7 +33,7 @@ class Ellipsoid(Record):
 
 
 class Torus(Record):
-    """A ring, whose hole lines go through: ``tube`` is the radius of the tube around a circle of ``radius`` across ``axis``."""
+    """A ring with a hole that lines pass through: a tube of radius ``tube`` about a circle of ``radius`` across ``axis``."""
 
     centre: Point
     axis: Axis
@@ -50,7 +50,7 @@ class Torus(Record):
 class ObstacleOn(Record):
     """One ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``, given at rest, that moves with a ``bone``.
 
-    ``start`` and ``end`` of a cylinder say where its axis is: it does not end there.
+    ``start`` and ``end`` of a cylinder define its axis; the cylinder is infinite.
     """
 
     bone: str

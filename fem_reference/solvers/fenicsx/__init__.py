@@ -102,7 +102,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     with opened(chosen.ranks or 1) as solver:
         outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
-        begin = "while overlap with bones at rest was relaxed, before the first frame (which is shown as it was given)"
+        begin = "while an overlap at rest was removed, before the first frame (which is shown as it was given)"
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
@@ -113,7 +113,7 @@ class _Describe(Protocol):
 
 
 def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
-    """A function that describes a frame; of several muscles by muscle: scalars then have the muscle's name before a dot."""
+    """A function that describes a frame. For several muscles it does so for each: scalars then begin with its name and a dot."""
     if isinstance(problem, MuscleProblem):
         return partial(_described, problem, loads=_are_known(problem, settings))
     spans, names = problem.spans, tuple(problem.problems)
@@ -135,7 +135,7 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
 
 
 def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
-    """The components of the force and the moment of a muscle by ``name`` on an ``other``, where these may touch."""
+    """The components of the force and the moment of the muscle ``name`` on the ``other``, where these may touch."""
     found, key = dict[str, float](), force_between(name, other)
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         if key in vectors:
@@ -144,8 +144,8 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True where external loads act and follow from the shape alone: load and moment are quadratic in it, so that quadrature of a
-    degree below 4 gives others.
+    """True where external loads act and follow from the shape alone. Load and moment are quadratic in it, so a quadrature of a
+    degree below 4 is not exact.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))

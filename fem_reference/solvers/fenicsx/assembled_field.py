@@ -113,7 +113,7 @@ def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, A
 
 
 def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
-    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is no solution."""
+    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason where there is none."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
         return x.array, "the equations have a number that is not finite: a formula without a value somewhere?"

@@ -102,7 +102,7 @@ class AssembledBody:
         return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
-        """Begin with the nodes at ``moved`` of the rest points (n, 3) [mm]."""
+        """Begin with the nodes at the positions to which ``moved`` takes their rest points (n, 3) [mm]."""
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()

@@ -1,5 +1,5 @@
 """Material points that may be near a bone. The points of a cell form a patch, which is out of reach until its nodes have moved
-as far as the patch was away.
+as far as its distance was.
 """
 
 from collections.abc import Callable

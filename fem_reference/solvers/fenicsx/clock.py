@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.forms import TimeStep
 
-# Share of all frames for which forces act on a body at rest, to find its initial acceleration.
+# The share of all frames over which forces act on a body at rest, to find its initial acceleration.
 _INSTANT = 1e-7
 
 

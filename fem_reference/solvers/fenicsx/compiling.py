@@ -32,7 +32,9 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, run by one process at a time: to tell forms apart takes longer than to find a compiled one."""
+    """FFCx's compilation, run by one process at a time. A lock for each form would cost more: its signature takes longer than the
+    search for a compiled form.
+    """
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
@@ -107,8 +109,8 @@ def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
 
 
 def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
-    """A compiled ``value`` at reference ``points`` (q, 3), and its ``firsts`` components. A formula is differentiated and found
-    among the compiled ones once: what another body has of it differs in functions and constants alone, in the same order.
+    """A compiled ``value`` at reference ``points`` (q, 3), and its ``firsts`` components. A formula is differentiated and searched
+    for among the compiled ones only once: in another body only its functions and constants differ, in the same order.
     """
     functions, constants = extract_coefficients(value), extract_constants(value)
     labels = sorted(extract_type(value, Label), key=Label.count)
@@ -116,7 +118,7 @@ def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpres
     numbers = {one: i for kind in known for i, one in enumerate(kind)}
     key = compute_expression_signature(value, numbers), points.tobytes().hex(), firsts
     if key not in _codes:
-        whole = _expanded(value)
+        whole = map_expr_dag(_WithoutVariables(), expand_derivatives(value))
         parts = [ufl.as_vector(whole.ufl_operands[:count]) for count in firsts]
         _codes[key] = tuple(_code(one, points, functions, constants) for one in (whole, *parts))
     return [BoundExpression(code, functions, constants) for code in _codes[key]]
@@ -131,14 +133,11 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
     return _Code(code, module, tuple(map(functions.index, read)), tuple(map(constants.index, extract_constants(value))))
 
 
-def _expanded(value: Any) -> Any:
-    """``value`` with its derivatives expanded and without its variables of differentiation: UFL numbers these through the whole
-    process, so a compiled form would not be found again.
-    """
-    return map_expr_dag(_WithoutVariables(), expand_derivatives(value))
-
-
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
+    """Replaces variables of differentiation by their values: UFL numbers them through the whole process, so a compiled form would
+    not be found again.
+    """
+
     expr = MultiFunction.reuse_if_untouched
 
     def variable(self, _: Any, operand: Any, label: Any) -> Any:  # noqa: ARG002

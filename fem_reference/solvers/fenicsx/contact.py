@@ -78,7 +78,7 @@ class ContactForces:
         self.settle()
 
     def look(self) -> None:
-        """Look for points as far from each bone as it is felt with the overlaps at rest, or supports them there."""
+        """Search for points within the reach of each bone: where it presses with the overlaps at rest, or supports a body there."""
         patches, support = Patches(self.points), self.law.in_situ or 0.0
         reach = [self.law.smoothing + max(support, float(-one.min(initial=0.0))) for one in self.overlaps]
         self.nearby = [Nearby(bone.shape, far, patches) for bone, far in zip(self.bones, reach, strict=True)]
@@ -110,7 +110,7 @@ class ContactForces:
         return replace(found, traction=own[0], slope=own[1], grip=grip)
 
     def _held(self, i: int) -> Floats:
-        """The places (n, 3) [mm] of the points in the frame of a bone that presses them; not a number where it does not."""
+        """The places (n, 3) [mm] of the points in the frame of bone ``i`` where it presses them; NaN elsewhere."""
         found, some = np.full(self.points.rest.shape, np.nan), self.now[i].pressed
         found[some] = self._local(i, self.frame, self.moved, some)
         return found
@@ -167,8 +167,8 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; where the
-        law has parts, on the points of each.
+        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; also on the
+        points of each part of the law.
         """
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -181,7 +181,7 @@ class ContactForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, whose distance was asked for;
+        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, whose distance was computed;
         ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
@@ -229,7 +229,7 @@ class ContactForces:
 
     @property
     def state(self) -> State:
-        """The contact with each bone, its frame, and what the nodes that carry points have been moved by."""
+        """The contact with each bone, its frame, and the displacement of the nodes that carry points."""
         return self.now, self.frame, self.moved
 
     def restoring(self) -> Callable[[], None]:
@@ -250,7 +250,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """The bones near whose middle a point is pressed, from where it could leave on any side, by how near."""
+        """The bones in which a pressed point is so deep that it could leave on any side, with its depth over half the thickness."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -260,7 +260,7 @@ class ContactForces:
         return mine
 
     def _from_afar(self) -> list[tuple[float, str]]:
-        """The bones with friction that a point met in one step from where no distance is known: it slips from nowhere."""
+        """The bones with friction that a point met in one step from where no distance is known, so its slip cannot be computed."""
         mine = list[tuple[float, str]]()
         for i, friction in enumerate(self.friction):
             pressed = self.now[i].pressed

@@ -46,7 +46,7 @@ class Derivatives(NamedTuple):
 class Form:
     """The weak form of a body. ``derivatives``: those of the energy, with ``kinds`` variables per component of the displacement;
     effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 without;
-    ``stretched``: that of what stores energy on the surface, 0 without.
+    ``stretched``: that of effects that store energy on the surface, 0 without.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
     fibres). To be set: the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
@@ -119,7 +119,7 @@ class Form:
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
-        """The energy of what is stretched on the surface, 0 without; shares in regions are linear between the vertices."""
+        """The energy of effects that store it on the surface, 0 without; shares in regions are linear between the vertices."""
         stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
         shares: dict[str, Any] = {}
         for name in regions_named(stored):

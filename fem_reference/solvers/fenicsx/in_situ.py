@@ -1,8 +1,8 @@
 """Equilibrium at rest of a body in situ: the stress, the extended springs and the bones' pressure that balance its tension.
 
-All follow from the small displacement of an isotropic body, its ``response`` to the forces of what acts at rest. It stands on the
-body's attachments and springs, and on bones as one-sided springs: a linear problem, but for what these touch, which Newton's
-method finds as a set of active points.
+All follow from the small displacement of an isotropic body, its ``response`` to the forces of the effects at rest. The body's
+attachments and springs support it, and bones as one-sided springs: a linear problem, but for the points that these touch, which
+Newton's method finds as an active set.
 """
 
 import numpy as np
@@ -50,8 +50,8 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 
 class Supports:
-    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there, which the
-    smoothing does not change; other points within that feel nothing at rest.
+    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there, whatever
+    the smoothing. Other points within the smoothing are not pressed at rest.
     """
 
     def __init__(self, contact: ContactForces) -> None:
@@ -68,7 +68,7 @@ class Supports:
         self.press(np.zeros(len(contact.unknowns.x.array)))
 
     def press(self, response: Floats) -> None:
-        """Have bones press at rest as the springs do at a ``response`` (n,) of the unknowns."""
+        """Make bones press at rest as the springs do at a ``response`` (n,) of the unknowns."""
         for overlap, near, gap, depth in zip(
             self.contact.overlaps, self.near, self.gaps, self._depths(response), strict=True
         ):

@@ -53,8 +53,8 @@ def _is_of(whole: Kept, number: int) -> bool:
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose
     positions are requested. Only a muscle has them, and then forces at edges shared by attachments are divided between these.
-    ``kept``: the states that are kept, if any. InputError where stable states are to be followed with friction, under which none
-    is known to be.
+    ``kept``: the states that are kept, if any. InputError where stable states are to be followed with friction: stability under
+    friction is not known.
     """
 
     body: Body

@@ -28,7 +28,7 @@ class LinearSolveError(ArithmeticError):
 
 
 def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
-    """FGMRES with the present ``matrix``, for at most so many iterations, still without a preconditioner."""
+    """FGMRES with the present ``matrix``, for at most so many iterations; the caller sets its preconditioner."""
     krylov = PETSc.KSP().create(matrix.comm)
     krylov.setType("fgmres")
     krylov.setGMRESRestart(most)
@@ -91,7 +91,7 @@ class Factorised:
 
     def factorise(self) -> None:
         """Factorise the present matrix; ``LinearSolveError`` where this fails."""
-        if self.entries != self.matrix.getInfo()["nz_used"]:  # of a matrix that has grown the factors are others
+        if self.entries != self.matrix.getInfo()["nz_used"]:  # a matrix that has grown needs new factors
             self._choose(self.precision)
         options = PETSc.Options(self.krylov.getOptionsPrefix())
         with self.spent.on("factorisation"):

@@ -81,10 +81,6 @@ class Tabulated:
         """The values (m, q, c) of ``unknowns`` (n,)."""
         return np.asarray(self.values @ unknowns[self.unknowns])
 
-    def slopes_at(self, unknowns: Floats) -> Floats:
-        """Their slopes (m, q, c, 3)."""
-        return np.stack([slope @ unknowns[self.unknowns] for slope in self.slopes], axis=-1)
-
 
 def tabulate(space: fem.FunctionSpace, unknowns: Ints, points: Floats) -> Tabulated:
     """A part of the unknowns at reference ``points`` (q, 3): its ``space``, and the ``unknowns`` (m, k, c) of the cells' nodes."""
@@ -107,7 +103,7 @@ class Displacement:
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
-    """The mesh, distributed over the ranks; the first rank provides it."""
+    """The mesh of the first rank, distributed over all ranks."""
     element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
     ours = reference_nodes(cells.kind, cells.degree)
     nodes = lagrange(cells.kind, cells.degree).points
@@ -134,7 +130,7 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
 
 
 def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
-    """The measure of this rank's facets, by number of the region and by degree."""
+    """The measure of this rank's facets for a ``degree`` of quadrature; its subdomains are the numbers of the regions."""
     kind = fem.IntegralType.exterior_facet
     parts = [(i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions)]
     return ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree})

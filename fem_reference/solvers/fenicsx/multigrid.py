@@ -55,7 +55,7 @@ class Multigrid:
             raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
 
     def solve_exactly(self) -> bool:
-        """False: memory does not suffice for a factorisation."""
+        """False, as memory does not suffice for a factorisation."""
         return False
 
     def _renew(self) -> None:

@@ -16,7 +16,7 @@ from fem_reference.solvers.fenicsx.system import System
 _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, its factor and its bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
-# Newton gives up if within so many iterations the residual did not fall to this share of its earlier best.
+# Newton gives up if the residual did not fall to this share of its earlier best within so many iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
 # Where a linear solution would end below the target of Newton's method, it continues to this share of the target: the residual
 # of the last system is the residual of all.

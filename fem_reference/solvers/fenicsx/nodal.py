@@ -13,7 +13,7 @@ from fem_reference.solvers.fenicsx.rest_stress import RestStress
 
 
 class Nodal:
-    """Gathers what belongs to the ``cells`` of a body from the ranks that own them."""
+    """Gathers values of the ``cells`` of a body from the ranks that own them."""
 
     def __init__(
         self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock, rest: RestStress | None

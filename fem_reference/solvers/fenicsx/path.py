@@ -19,7 +19,8 @@ KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
 
-# Loads and boundary conditions are the same if none differs by more (mm, and entries of a pose): rounding of a returning motion.
+# Loads and boundary conditions are the same if none differs by more than the rounding of a returning motion (mm, and entries of a
+# pose).
 _SAME = 1e-9
 # States are kept up to this memory [bytes] on each rank, the latest ones.
 _MOST = 512e6
@@ -64,7 +65,7 @@ class Path:
         that stiffens, or a rotation, it is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` a
         state ``halfway`` is solved for (the function says if it was found; the unknowns are its own then, and restored
         afterwards), and Simpson's rule applies, whose error falls with the fourth power. In a jump the energy falls without work,
-        by any rule. ``gap`` is the greatest difference since it was taken, over the greatest energy so far.
+        by any rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
         """
         states = [
             (self.unknowns, self.forces),

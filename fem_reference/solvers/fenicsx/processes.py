@@ -27,7 +27,7 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-# Ranks that any machine accepts; more only where there are as many cores.
+# The number of ranks that any machine accepts; more are accepted only with as many cores.
 _MOST_RANKS = 8
 PATIENCE = 5.0  # [s] from the request to end a process until it is killed
 # Clock time that may pass, as a multiple of a limit of processor time and of the start-up: beyond it the machine is too busy
@@ -69,7 +69,9 @@ def command_line(ranks: int) -> list[str]:
 
 
 class Process:
-    """A process that ``words`` start. It reads the names of job files, one a line; its error output is read continuously."""
+    """A process started by the command ``words``. It reads the names of job files, one a line; its error output is read
+    continuously.
+    """
 
     def __init__(self, words: list[str]) -> None:
         pipe = subprocess.PIPE
@@ -93,7 +95,12 @@ class Process:
             with suppress(BrokenPipeError):  # a dead process does not read it, and its exit status shows that
                 self.input.write(f"{job}\n")
                 self.input.flush()
-            for report in self._reports():
+            for line in self.output:
+                if not line.startswith(MARK):
+                    continue
+                path = Path(line.removeprefix(MARK).rstrip("\n"))
+                report: Frame | Outcome = pickle.loads(path.read_bytes())
+                path.unlink()
                 if isinstance(report, Outcome):
                     return report
                 sink(report)
@@ -104,15 +111,6 @@ class Process:
             status, why = self.overran
             return Outcome(status, f"{why}; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
-
-    def _reports(self) -> Iterator[Frame | Outcome]:
-        """The frames and the outcome that it reports, until its output ends."""
-        for line in self.output:
-            if line.startswith(MARK):
-                path = Path(line.removeprefix(MARK).rstrip("\n"))
-                report = pickle.loads(path.read_bytes())
-                path.unlink()
-                yield report
 
     def _reason(self) -> str:
         """The most informative line of its error output: the last that names an error, else the last."""

@@ -22,7 +22,7 @@ LARGE = 350_000
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The most bytes of states, over all frames, that a run keeps by default.
 MOST_STATES = 2**26
-# From this number of unknowns on, a second rank pays, where a core is free for it.
+# From this number of unknowns on, a second rank saves time, where a core is free for it.
 _WORTH_RANKS = 20_000
 _GLANCE = 0.2  # [s] over which the load of the cores is measured
 
@@ -43,7 +43,7 @@ def unknowns(cells: Cells, element: str) -> int:
 
 
 def state(cells: Cells, element: str, *, steps: bool) -> int:
-    """Bytes of the state of ``cells`` at a frame; ``steps``: with the start of the last load step."""
+    """The size [bytes] of the state of ``cells`` at a frame; with ``steps`` also of the start of its last load step."""
     kind, degree, pressure = ELEMENTS[element]
     nodes, corners = (len(reference_nodes(kind, order)) for order in (degree, 1))
     pressures = {None: 0, 0: 1, 1: corners}[pressure]
@@ -108,6 +108,6 @@ def _idle(cores: set[int]) -> float:
 
 
 def ranks(settings: BodySettings, count: int) -> int:
-    """The number of ranks for a solution of ``count`` unknowns: two where that pays and a core is free for each."""
+    """The number of ranks for a solution of ``count`` unknowns: two where that is faster and a core is free for each."""
     worth = settings.linear_solver != "multigrid" and count >= _WORTH_RANKS
     return 2 if worth and idle_cores() >= 2 else 1

@@ -36,7 +36,7 @@ class Restart:
         return np.asarray(np.argsort(np.argsort(first))[which]).reshape(names.shape)
 
     def _gathered(self, mine: Floats) -> Floats:
-        """The values (n,) of all unknowns from this rank's."""
+        """The values (n,) of all unknowns, gathered from ``mine`` and those of the other ranks."""
         values = self.body.nodal.gathered(mine[self.dofs[: len(self.body.cells)]])
         found = np.zeros(self.numbers.max() + 1)
         found[self.numbers] = values

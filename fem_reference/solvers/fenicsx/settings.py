@@ -17,19 +17,19 @@ class BodySettings(Record):
     easy step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts.
     ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of the volume equation.
-    ``quadrature_degree``: of the polynomials integrated exactly on a straight cell, by default as the element needs.
+    ``quadrature_degree``: of the polynomials integrated exactly on a straight cell, by default as required by the element.
     ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation for each system, solved exactly; ``"lagged"``, inexact
-    FGMRES with a factorisation that serves until a new one is cheaper, and exact solutions where load steps would end otherwise;
-    by default as the size suggests. ``precision``: of factorisations, by default double for direct and single for lagged ones.
-    Both change the time and not the answer.
-    ``follow``: ``"equilibrium"`` as Newton's method finds it, or ``"stable"``: at a frame with an unstable equilibrium, as far as
-    negative modes are counted, the body is moved along its lowest mode by a ``perturbation``, a share of its size (up to eight
-    times that, in both directions, until there are fewer negative modes), and solved again.
-    ``reuse``: take up the state of an earlier frame under the same load.
-    ``time_limit``: processor time of a rank after which to give up, by default none; twenty times that by the clock is the status
-    *stalled*, which allows no conclusion. ``store_state``: each frame also carries the unknowns of every cell, from which
-    ``results`` evaluates stress, pressure, det F and fibre stretch; by default where those of all frames of a muscle take at most
-    64 MB, and never for a body.
+    FGMRES with a factorisation that is kept until a new one is cheaper, and exact solutions before a run ends ``out of steps``;
+    the default depends on the size. ``precision``: of factorisations, by default double for direct and single for lagged ones.
+    Both change the time but not the result.
+    ``follow``: ``"equilibrium"``, the one that Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium
+    (only where negative modes are counted) the body is moved along its lowest mode by a ``perturbation``, a share of its size, and
+    solved again; up to eight times that, in both directions, until there are fewer negative modes.
+    ``reuse``: use the state of an earlier frame with the same load again.
+    ``time_limit``: the limit of processor time of a rank, by default none; after twenty times that by the clock the status is
+    *stalled*, which allows no conclusion. ``store_state``: each frame also stores the unknowns of every cell, from which
+    ``results`` evaluates stress, pressure, det F and fibre stretch; by default only for a muscle, if those of all frames take at
+    most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -49,14 +49,14 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two where that pays and cores are free; they change the
-    time, not the answer.
+    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two where that is faster and cores are free; they change
+    the time, not the result.
     """
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 
 
 class FieldSettings(Record):
-    """Settings of scalar fields. ``time_limit``: processor time after which to give up, by default none."""
+    """Settings of scalar fields. ``time_limit``: the limit of processor time, by default none."""
 
     time_limit: Time | None = None

@@ -57,7 +57,7 @@ class System:
         self._use(self.cells.structure(), 1.0)
 
     def _use(self, structure: Structure, unit: float) -> None:
-        """Have tangent and matrix take the entries of a ``structure``; those of ghost rows go to the ranks that own them."""
+        """Give the tangent and the matrix the entries of a ``structure``; entries of ghost rows go to the ranks that own them."""
         blocks = self.index_map.local_to_global(np.arange(self.size // self.block, dtype=np.int32))
         names = (blocks[:, None] * self.block + np.arange(self.block)).ravel().astype(PETSc.IntType)
         rows = np.repeat(np.arange(self.size), np.diff(structure.starts))

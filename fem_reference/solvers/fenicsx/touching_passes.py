@@ -234,7 +234,7 @@ class Pass:
             high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
             rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
         paths = (starts, ends, free), (starts + rise, ends + rise, free & rise.any(axis=1))
-        points, facets = np.concatenate([self._passed(*path, (old, new)) for path in paths], axis=1)
+        points, facets = np.concatenate([self._passed(a, b, some, old, new) for a, b, some in paths], axis=1)
         there = self.other.nearest(new, facets, ends[points])
         front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= 0)
         return np.union1d(behind, points[~front])
@@ -254,9 +254,8 @@ class Pass:
         lost = (np.isin(near.points, pressed) & facing) | deep
         return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
-    def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], nodes: tuple[Floats, Floats]) -> Ints:
+    def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], old: Floats, new: Floats) -> Ints:
         """The ``free`` points (n,) that pass flat pieces of facets on their path, and these facets: (2, p)."""
-        old, new = nodes
         shift = (new - old).mean(axis=(0, 1))  # what all do together changes nothing
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
@@ -268,7 +267,7 @@ class Pass:
         for part in np.array_split(np.arange(len(some)), len(some) // _AT_ONCE + 1):
             pieces = self.pieces[facets[part]]
             which, points = facets[part, None, None], np.repeat(some[part], pieces.shape[1])
-            corners = (at[which, pieces].reshape(-1, 3, 3) for at in (old, new))
+            corners = (nodes[which, pieces].reshape(-1, 3, 3) for nodes in (old, new))
             found = passed(starts[points], ends[points], *corners).reshape(pieces.shape[:2]).any(axis=1)
             lost.append(np.stack([some, facets])[:, part[found]])
         return np.concatenate(lost, axis=1)

@@ -2,7 +2,7 @@
 
 Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far off in a cell
 that has kept its volume. Means of single cells may be off there too (0.37 and 1.9 in ``gluteus_maximus``, with a bulk modulus of
-a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
+a thousand shear moduli). There a law outside its range is named, but a body has collapsed only where more of it is lost.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
-from fem_reference.effects import Effect, State, name_of, region_of
+from fem_reference.effects import State, name_of, region_of
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
@@ -25,7 +25,7 @@ from fem_reference.solvers.fenicsx.meshes import geometry
 
 # A cell with less of its rest volume has collapsed, whatever the laws state: about four fifths of muscle are water,
 # which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal
-# muscle); below a fifth even the rest would have no room. A body has collapsed where such cells are more than this
+# muscle); less than a fifth would not hold even the rest. A body has collapsed where such cells are more than this
 # share of it at rest: those at a rim are fewer the smaller they are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
@@ -93,7 +93,7 @@ class Validity:
         return float(present / rest)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Collapsed where more than next to nothing of the body has lost too much volume."""
+        """Collapsed where more than a negligible part of the body has lost too much volume."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
@@ -116,16 +116,13 @@ class Validity:
             low, high = self._extreme(means), self._extreme(means, -1.0)
             scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
             for effect, limit in [one for one in limits if one[1].measure == measure]:
-                there = np.where(self._acts(effect), means, np.clip(means, limit.low, limit.high))
+                acts = self.here.share(region_of(effect)) > 1 / 2  # in the middle of a cell
+                there = np.where(acts, means, np.clip(means, limit.low, limit.high))
                 outside |= (there < limit.low) | (there > limit.high)
                 low, high = self._extreme(there), self._extreme(there, -1.0)
                 found += [Outside(name_of(effect), limit, low)] if low.value < limit.low else []
                 found += [Outside(name_of(effect), limit, high)] if high.value > limit.high else []
         return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
-
-    def _acts(self, effect: Effect) -> Any:
-        """True in cells whose middle an ``effect`` has most of: (n,), or one for all."""
-        return self.here.share(region_of(effect)) > 1 / 2
 
     def _means(self, measure: str) -> Floats:
         """The means over the cells of this rank (n,)."""

@@ -101,15 +101,15 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on; True where that is a change. The residual of an inexact solution moves a
-        nearly free body far away.
+        """Solve linear systems exactly from now on, as the residual of an inexact solution moves a nearly free body far away. True
+        where that is a change.
         """
         other = self.body.linear.solve_exactly()
         self.exact |= other
         return other
 
     def departures(self) -> str:
-        """The note on unstable equilibria that were left; empty where there were none."""
+        """The note on unstable equilibria that the run has left by a perturbation; empty without any."""
         if not self.left:
             return ""
         return (
@@ -138,7 +138,7 @@ class Worker:
         )
 
     def failure(self, reached: Step) -> tuple[Status, str]:
-        """The status of a run that did not reach a frame, and the reason, the place, and what to try."""
+        """The status of a run that did not reach a frame; and the reason, the place and a remedy in words."""
         body, contact = self.body, self.body.contact
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, body.validity.examine(reached.at)[1])

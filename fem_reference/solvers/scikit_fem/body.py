@@ -31,11 +31,11 @@ _GROWTH = 10.0  # of the residual, above which a Newton step is halved
 class ScikitBodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
-    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces
-    and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
-    default what the element needs.
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each frame:
+    it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of
+    the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default as
+    required by the element.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -47,7 +47,7 @@ class ScikitBodySettings(Record):
 
 
 def _check_known(body: Body) -> None:
-    """Raise InputError where a body has a part that this solver knows nothing of."""
+    """Raise InputError where a body has a part that this solver does not support."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without it, as this solver has no contact")

@@ -59,7 +59,7 @@ def flat(mesh: FieldMesh) -> Flat:
 
 
 def space(problem: FieldProblem) -> tuple[Any, Flat]:
-    """The basis of the problem's elements and the flat mesh that it stands on."""
+    """The basis of the problem's elements and its flat mesh."""
     laid = flat(problem.mesh)
     element = _ELEMENTS[problem.mesh.cells.shape[1]][problem.order - 1]()
     return skfem.Basis(laid.mesh, element, intorder=QUADRATURE_DEGREE), laid
@@ -68,7 +68,9 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
     """Matrix (N, N) and right side (N,) of the weak form, without fixed values; nodes in the order of the problem."""
     basis, laid = space(problem)
-    place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
+    slope_of = _slope_weights(basis)
+    position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
+    place = Place(tuple(position + laid.origins.T[:, :, None]), vars(np), problem.upper[:, None])
 
     def state(function: Any) -> FieldState:
         gradient = np.einsum("mda,amq->dmq", laid.frames, grad(function))
@@ -101,7 +103,7 @@ def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> O
 
 
 def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
-    """The values (N,) at the nodes and how it ended."""
+    """The values (N,) at the nodes and the outcome."""
     begin = time.perf_counter()
     A, b = assemble(problem)
     assembled = time.perf_counter()
@@ -127,12 +129,6 @@ def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
 
 def _failed(count: int, why: str) -> tuple[Floats, Outcome]:
     return np.full(count, np.nan), Outcome("diverged", why)
-
-
-def _place(problem: FieldProblem, basis: Any, laid: Flat) -> Place:
-    position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
-    position = position + laid.origins.T[:, :, None]
-    return Place(tuple(position), vars(np), problem.upper[:, None])
 
 
 def _slope_weights(basis: Any) -> Floats:

@@ -1,6 +1,6 @@
 """Elements of scikit-fem on the cells of a body, evaluated at points of its cells and facets.
 
-What an effect may depend on at a point are 13 variables: the entries of F row by row, the displacement and the pressure. Each is
+An effect may depend on 13 variables at a point: the entries of F row by row, the displacement and the pressure. Each is
 linear in the unknowns: the three components of the displacement node by node, then the pressure.
 """
 
@@ -31,7 +31,7 @@ _ELEMENTS = {
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of integration, q in each of m ``cells`` (m,): where they are, ``places`` (m, q, 3) [mm], their ``weights`` (m, q)
+    """Points of integration, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q)
     [mm3 or mm2], the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement and ``pressures``
     (m, q, l) of the pressure, the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3), and in a body
     with fibres their directions ``fibre`` (m, q, 3).
@@ -103,12 +103,12 @@ class Space:
 
     @cached_property
     def vertices(self) -> Points:
-        """The corners of all cells; they have no weight that means anything."""
+        """The corners of all cells; their weights have no meaning."""
         corners = self.nodal.refdom.p
         return self._points(skfem.Basis, (corners, np.ones(corners.shape[1])))
 
     def facets(self, region: str) -> Ints:
-        """The facets of scikit-fem's mesh in ``region``; InputError where one of them is not of one cell."""
+        """The facets of scikit-fem's mesh in ``region``; InputError where one of them does not belong to exactly one cell."""
         wanted = np.unique(np.sort(self.cells.facets[region], axis=1), axis=0)
         found = []
         for side, facets in zip(self.nodal.refdom.facets, self.mesh.t2f, strict=True):
@@ -129,7 +129,7 @@ class Space:
         return self._points(skfem.FacetBasis, rule, facets=self.facets(region))
 
     def _points(self, kind: Any, rule: tuple[Floats, Floats], **where: Ints) -> Points:
-        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem, ``where`` it is."""
+        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem; ``where``: its ``facets``, if it is on facets."""
         own, *others = (
             kind(self.mesh, basis.elem, quadrature=rule, dofs=basis.dofs, disable_doflocs=True, **where)
             for basis in (self.basis, self.pressure)

@@ -1,1 +1,1 @@
-"""Hard cases: their files, the problems that they pose, and every solver on each of them."""
+"""Hard cases: their files, their problems, and runs of every solver on each of them."""

@@ -1,12 +1,14 @@
-"""Blocks as problems: an axis-aligned lattice of tetrahedra whose skin is the surface that solvers get."""
+"""Blocks as problems: an axis-aligned lattice of tetrahedra, whose boundary is the surface given to solvers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from fem_reference import effects
 from fem_reference.effects.contact import among
+from fem_reference.effects.touching import MuscleContact
+from fem_reference.effects.touching import among as touching_among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
 from fem_reference.foundations.motion import apply
@@ -17,16 +19,17 @@ from fem_reference.geometry.skins import spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import MuscleProblem, assembled, closed_form
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
-from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
+from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, Lattice, Start
 
-# What blocks are of where a case says nothing else: muscle's usual matrix.
+# The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
-# The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
+# The bones of held faces are balls: their radius and distance in sizes of the block; nothing meets them there.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # of the block's size: rounding of what two holds do alike
+_SAME = 1e-9  # of the block's size: the rounding between equal motions of two holds
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -57,6 +60,29 @@ def problem(hard: Hard) -> MuscleProblem:
     return _filled(block, setup, TetMesh(points, tets, facets, maker="lattice"), acting)
 
 
+def several(hard: Hard) -> MusclesProblem:
+    """The problem of the block of ``hard`` and the bodies beside it, any two of which may touch where that acts."""
+    law, apart = touching_among(hard.effect), dict[str, MuscleProblem]()
+    parts = {FIRST: hard}
+    for one in hard.beside:
+        own = {"block": one.block, "hold": one.hold, "effect": one.effect or hard.effect}
+        parts[one.name] = hard.model_copy(update=own)
+    for name, part in parts.items():
+        acting = tuple(effect for effect in part.effect if not isinstance(effect, MuscleContact))
+        apart[name] = _named(name, problem(part.model_copy(update={"effect": acting})))
+    # All have all bones, as the muscles of a scene.
+    held = tuple(entry.bone for one in apart.values() for entry in one.attached)
+    bones = (*held, *next(iter(apart.values())).bones[len(hard.hold) :])
+    pairs = tuple(combinations(apart, 2)) if law else ()
+    return MusclesProblem({name: replace(one, bones=bones) for name, one in apart.items()}, pairs, law, apart=True)
+
+
+def _named(name: str, one: MuscleProblem) -> MuscleProblem:
+    """A block whose holds have bones with its ``name``."""
+    held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
+    return replace(one, attached=tuple(held))
+
+
 @dataclass(frozen=True, eq=False)
 class Moved:
     """A block about its ``middle`` (3,) [mm], its cells of a size of ``cell`` [mm], moved as ``start`` describes."""
@@ -66,7 +92,7 @@ class Moved:
     cell: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Positions of rest points (n, 3) [mm]; a point is moved at random alike, whichever others are asked for."""
+        """Positions of rest points (n, 3) [mm]; the random displacement of a point does not depend on the other points."""
         match self.start.kind:
             case "point":
                 return np.broadcast_to(self.middle, points.shape).copy()
@@ -95,13 +121,22 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
         shares[:, k] = np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])[nodes[:, k]]
     if block.jitter:
         random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
-        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, and edges and corners where they are
+        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat; edges and corners stay in place
         shares += random
-    return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))
+    around = shares if block.rounding == 0 else (1 + _rounded(2 * shares - 1, block.rounding)) / 2
+    return np.asarray(np.asarray(block.corner) + around * np.asarray(block.size))
+
+
+def _rounded(unit: Floats, share: float) -> Floats:
+    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the ball inside by a ``share`` of their way: with y and z the
+    other two, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, so that the surface of the cube is that of the ball.
+    """
+    y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))
+    return np.asarray(unit * (1 - share + share * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)))
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
-    """Indices (k,) of those ``nodes`` (n, 3) of the lattice that are on a ``face``."""
+    """Indices (k,) of the ``nodes`` (n, 3) of the lattice on a ``face``."""
     axis = "xyz".index(face[0])
     return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
 
@@ -123,7 +158,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """InputError where two holds would take the vertices that they share to different places: for most solvers one of them wins."""
+    """InputError where two holds move their shared vertices to different places: most solvers would obey only one of them."""
     assert hard.frames is not None  # beside a block
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})

@@ -1,4 +1,4 @@
-"""Runs of hard cases: followed frame by frame as their health is measured, and repeated in other load steps and on other meshes."""
+"""Runs of hard cases: their frames, whose health is measured, and their repetition in other load steps and on other meshes."""
 
 import time
 from collections import Counter
@@ -13,8 +13,8 @@ from fem_reference.assessment.health import Followed
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.problems.of_case import CaseProblem, MechanicalProblem, at_frames, mechanical
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
@@ -22,20 +22,20 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies.hard.records import Hard, StepCounts, task_of
+from fem_reference.studies.hard.records import Hard, Lattice, StepCounts, task_of
 
-_MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
+_MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
-_CUTS = 64  # a load step is cut to this part of itself before it is given up
-MOVED = 0.1  # of a cell of a block, by which its points are moved at most
-SIZES = 0.03  # of the size of the tetrahedra of a shipped case, by which it differs at most
-LONGEST = 60.0  # [s] of processor time of a run that is repeated
+_CUTS = 64  # the greatest factor by which a load step is cut before it is given up
+MOVED = 0.1  # greatest random displacement of points of a block, in cells
+SIZES = 0.03  # greatest relative change of the size of tetrahedra of a shipped case
+LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """The machine was too busy for a conclusion about a run; the reason."""
+    """Raised where the machine was too busy for a conclusion about a run."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
@@ -46,15 +46,16 @@ def check_not_stalled(outcome: Outcome) -> None:
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     """Solve a problem by a solver; InputError where it does not suit the solver, StalledError where the machine was too busy."""
-    solver, task, muscle = choice.solver, task_of(choice.solver, built.task), built.muscle
+    solver, task, muscle = choice.solver, task_of(choice.solver, built.task), mechanical(built)
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
     if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
         want = "one that moves a surface, whose health is measured"
         raise InputError(solver, f"a solver that moves {offer.moves}", want)
-    if muscle and as_body and len(muscle.mesh.tets) > _MOST_FOR_SECOND:
+    tets = 0 if muscle is None or muscle.rest.mesh is None else len(muscle.rest.mesh.tets)
+    if as_body and tets > _MOST_FOR_SECOND:
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, for correctness and not for speed"
-        raise InputError(solver, f"{len(muscle.mesh.tets)} tetrahedra", want)
+        raise InputError(solver, f"{tets} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
     solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
     solvers.find(solver, solver, task).require(settings)
@@ -67,8 +68,8 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         span = boundary.min(), boundary.max()
         return outcome, Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=span)
     assert muscle is not None  # what is no field
-    rest, mesh = muscle.surface.points, muscle.mesh
-    if as_body:  # whose surface goes along with the tetrahedra
+    rest, mesh = muscle.rest.surface.points, muscle.rest.mesh
+    if as_body and mesh is not None:  # whose surface goes along with the tetrahedra
         inside = Locator(mesh).embed(rest)
         frames = [replace(one, surface=rest + inside.interpolate(mesh, one.points - mesh.points)) for one in frames]
     if solvers.takes_effects(solver):
@@ -76,12 +77,12 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(rest))])
 
 
-def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
+def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
     tets = [frame.points for frame in frames if len(frame.points)]
     whole = len(tets) == len(frames)
 
     def scalar(name: str) -> Floats | None:
-        """A scalar of all frames (f,), None where not all have it."""
+        """A scalar of all frames (f,); None where a frame lacks it."""
         found = [frame.scalars[name] for frame in frames if name in frame.scalars]
         return np.array(found) if len(found) == len(frames) else None
 
@@ -89,9 +90,9 @@ def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
     known = [one for one in determinants if one is not None]
     return Followed(
         tuple(int(frame.number) for frame in frames),
-        built.surface,
+        built.rest.surface,
         np.array([frame.surface for frame in frames if frame.surface is not None]),
-        built.mesh if whole else None,
+        built.rest.mesh if whole else None,
         np.array(tets) if whole else None,
         built.bones,
         built.free,
@@ -99,30 +100,31 @@ def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
         negative_modes=scalar("negative_modes"),
         material_modes=scalar("material_modes"),
         least_determinant=np.min(known, axis=0) if known else None,
+        spans=built.spans if isinstance(built, MusclesProblem) else (),
     )
 
 
 @dataclass(frozen=True)
 class SameEnd:
-    """A comparison of runs that should end alike: ``same`` where those that reached the end did; a ``sentence`` on each."""
+    """A comparison of runs that should end alike: ``same``: those that reached the end agree; a ``sentence`` about them."""
 
     same: bool
     sentence: str
 
 
 def farthest(followed: Followed) -> StepCounts | None:
-    """Load steps to the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+    """Load steps to the frame at which a run is farthest from its first state; None for a run that did not leave it."""
     moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
     return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
 
-def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
+def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
     """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
         settings, frames = fenicsx.Settings(**{**choice.settings, **step}), list[Frame]()
-        outcome = fenicsx.solve(replace(built, frames=(built.frames[0], steps.until)), settings, frames.append)
+        outcome = fenicsx.solve(at_frames(built, (built.frames[0], steps.until)), settings, frames.append)
         check_not_stalled(outcome)
         if outcome.status == "converged":
             ends[count] = frames[-1].points
@@ -130,7 +132,7 @@ def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> S
             words.append(f"{count}: {outcome.status}")
     if not ends:
         return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
-    standard, size = ends[max(ends)], diagonal(built.surface.points)
+    standard, size = ends[max(ends)], diagonal(built.rest.surface.points)
     off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
     apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
     listed = ", ".join(apart + words) or "one only"
@@ -138,16 +140,20 @@ def in_steps(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> S
 
 
 def jittered(hard: Hard, number: int) -> Hard:
-    """The case on the mesh of a ``number``, the same each time."""
+    """The case on a random mesh; the seed ``number`` determines it."""
     if hard.block is not None:
-        jitter = max(hard.block.jitter, MOVED)
-        return hard.model_copy(update={"block": hard.block.model_copy(update={"jitter": jitter, "seed": number})})
+        others = [one.model_copy(update={"block": _shaken(one.block, number)}) for one in hard.beside]
+        return hard.model_copy(update={"block": _shaken(hard.block, number), "beside": tuple(others)})
     shipped = hard.shipped
     assert shipped is not None  # a Hard record has one of the two
     size = casefile.muscle(shipped.read()).muscle.tet_size
     share = 1 + SIZES * np.random.default_rng(number).uniform(-1, 1)
     changed = shipped.changes | {"muscle.tet_size": f"{share * float(size)!r} mm"}
     return hard.model_copy(update={"shipped": shipped.model_copy(update={"changes": changed})})
+
+
+def _shaken(block: Lattice, number: int) -> Lattice:
+    return block.model_copy(update={"jitter": max(block.jitter, MOVED), "seed": number})
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
@@ -159,7 +165,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
             other, found = solve(jittered(hard, number))
         except InputError as error:
             if not ended:
-                return SameEnd(True, f"no jitters: {error}")
+                return SameEnd(True, f"no run on other meshes: {error}")
             ended["refused"] += 1
             continue
         ended[other.status] += 1
@@ -167,21 +173,23 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
         reached.append(found.numbers[-1])
         off.append(_apart(followed, found))
         if time.process_time() - begin + elsewhere > LONGEST * number:
-            return SameEnd(True, f"no jitters, of which one takes more than {LONGEST:g} s")
+            return SameEnd(True, f"no runs on other meshes, as one takes more than {LONGEST:g} s")
     words = ", ".join(f"{many} {status}" for status, many in ended.most_common())
     if off:
         words += f", up to frame {' to '.join(map(str, sorted({min(reached), max(reached)})))}"
         words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
     statuses = set(ended) - {"refused"}
     alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses
-    return SameEnd(alike, f"jitters: {words}")
+    return SameEnd(alike, f"on other meshes: {words}")
 
 
 def _apart(one: Followed, other: Followed) -> float:
     """The greatest distance of two runs over the frames of both [% of the body's size]."""
-    both = min(len(one.numbers), len(other.numbers))
-    moved = other.positions[:both]
-    if other.mesh is not None and other.nodes is not None:
-        at = Locator(other.mesh).embed(one.surface.points)
-        moved = np.array([at.interpolate(other.mesh, nodes) for nodes in other.nodes[:both]])
-    return 100 * float(np.linalg.norm(one.positions[:both] - moved, axis=2).max()) / one.size
+    both, off = min(len(one.numbers), len(other.numbers)), list[float]()
+    for first, second in zip(one.bodies, other.bodies, strict=True):
+        moved = second.positions[:both]
+        if second.mesh is not None and second.nodes is not None:
+            at = Locator(second.mesh).embed(first.surface.points)
+            moved = np.array([at.interpolate(second.mesh, nodes) for nodes in second.nodes[:both]])
+        off.append(float(np.linalg.norm(first.positions[:both] - moved, axis=2).max()))
+    return 100 * max(off) / one.size

@@ -1,4 +1,4 @@
-"""Hard cases as files below ``cases/hard`` describe them, with their variants."""
+"""Records of hard cases, read from files below ``cases/hard``, with their variants."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import FileName, Record, join, keys, one_of, parse
+from fem_reference.foundations.records import FileName, Name, Record, join, keys, one_of, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
@@ -24,6 +24,7 @@ FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
 _MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
+FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # [s] of processor time of a run
 _OWN: dict[str, dict[str, Any]] = {
@@ -34,11 +35,12 @@ _OWN: dict[str, dict[str, Any]] = {
 
 
 class Lattice(Record):
-    """A block of ``size`` from its ``corner``, in so many ``cells`` along each axis, each cut into six tetrahedra.
+    """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
-    ``grading``: along each axis, the last cell over the first. ``jitter``: how far nodes are moved at random inside the block and
-    its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres, along which the lines run that are measured.
-    ``points_apart`` [mm]: how far apart points are on which bones press and springs pull, by default as on muscles.
+    ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
+    block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
+    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points on which bones press and springs pull, by default
+    as on muscles.
     """
 
     size: Point
@@ -47,6 +49,7 @@ class Lattice(Record):
     grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
     jitter: float = Field(default=0.0, ge=0, lt=0.5)
     seed: int = Field(default=17, ge=0)
+    rounding: float = Field(default=0.0, ge=0, lt=1)
     fibre: tuple[float, float, float] = (0.0, 0.0, 1.0)
     points_apart: PositiveLength | None = None
 
@@ -70,9 +73,18 @@ class Hold(Record):
     stiffness: AreaStiffness | None = None
 
 
+class OtherBody(Record):
+    """Another body, by its ``name``: a ``block`` with its ``hold``, and the ``effect`` that act in place of those in the first."""
+
+    name: Name
+    block: Lattice
+    hold: tuple[Hold, ...] = ()
+    effect: tuple[Effect, ...] = ()
+
+
 class Start(Record):
-    """The body at the first frame in place of its rest state: points moved at ``random`` by an ``amount`` of the size of
-    a cell, or the whole body collapsed to its middle ``point`` or ``plane`` across z or turned ``inside out``.
+    """The state at the first frame in place of rest: points moved at ``random`` by up to an ``amount`` of cells, or the whole body
+    collapsed to its middle ``point`` or ``plane`` across z, or turned ``inside out``.
     """
 
     kind: Literal["random", "point", "plane", "inside out"]
@@ -80,7 +92,7 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case``, where it is ``quick`` as tests solve it, with ``changes`` of its keys."""
+    """A shipped ``case``, with its ``quick`` settings for tests if so, and with ``changes`` of its keys."""
 
     case: str
     quick: bool = False
@@ -93,20 +105,20 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of even load steps (``counts``) in which the reference goes to the frame ``until``: they shall end alike."""
+    """Numbers of equal load steps (``counts``) in which the reference goes to the frame ``until``; all should end alike."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
 
 
 class Hard(Record):
-    """A hard case: a ``block`` with what acts on it, or a ``shipped`` case.
+    """A hard case: a ``block`` with what acts on it and bodies ``beside`` it, or a ``shipped`` case.
 
-    ``healthy`` says in words what a healthy run shows, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers
-    that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with
-    a status; ``contrast``: what it shows that goes wrong, so that a run should pass its bound. ``by_effects``: effects are all
-    that acts, and solvers that simulate none have nothing to do. ``settings``: by solver, those that differ from Table 5.1.
-    ``steps``: in which numbers of load steps the reference is asked for the same end state.
+    ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
+    case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
+    should end with a status; ``contrast``: the defect that the case demonstrates, so that a run should exceed its bound.
+    ``by_effects``: only effects act, so that the case does not apply to solvers that simulate none. ``settings``: by solver, those
+    that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
     """
 
     title: str
@@ -114,6 +126,7 @@ class Hard(Record):
     bound: tuple[Bound, ...] = Field(min_length=1)
     block: Lattice | None = None
     hold: tuple[Hold, ...] = ()
+    beside: tuple[OtherBody, ...] = ()
     bone: tuple[CaseBone, ...] = ()
     effect: tuple[Effect, ...] = ()
     frames: Frames | None = None
@@ -134,9 +147,9 @@ class Hard(Record):
     def _check_quantities(cls, bounds: tuple[Bound, ...]) -> tuple[Bound, ...]:
         strange = [bound.quantity for bound in bounds if bound.quantity not in health.QUANTITIES]
         if strange:
-            raise ValueError(f"quantities that are among {', '.join(health.QUANTITIES)}, as {strange[0]} is not")
+            raise ValueError(f"quantities among {', '.join(health.QUANTITIES)}; {strange[0]} is none of them")
         if all(bound.quantity == "from_reference" for bound in bounds):
-            raise ValueError("another quantity beside from_reference, which a run without a reference has not")
+            raise ValueError("another quantity beside from_reference, which a run without a reference lacks")
         return bounds
 
     @field_validator("hold")
@@ -159,6 +172,10 @@ class Hard(Record):
     def _check(self) -> Self:
         if (self.block is None) != (self.frames is None):
             raise ValueError('"frames" beside "block" and only there')
+        if self.beside and (self.block is None or self.start is not None or FIRST in (one.name for one in self.beside)):
+            raise ValueError(
+                f'"beside" with a "block", without a "start", and no body named "{FIRST}", as the first is'
+            )
         if bool(self.only) != bool(self.because):
             raise ValueError('"because" beside "only" and only there')
         return self
@@ -178,17 +195,17 @@ def choices() -> dict[str, SolverChoice]:
 
 
 def task_of(solver: str, task: Task) -> Task:
-    """The task that a solver is asked for in a case of a ``task``: the second solver has none for muscles but that of bodies."""
+    """The task of a solver in a case of a ``task``: the second solver solves muscles as bodies."""
     return "solve_body" if task == "solve" and solver == SECOND else task
 
 
 def folders() -> list[str]:
-    """The folders of hard cases that there are."""
+    """The names of the folders of hard cases."""
     return sorted(path.parent.name for path in FOLDER.glob("*/case.toml"))
 
 
 def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
-    """Every hard case, or those of folders or variants of these ``names``; InputError where there is none of a name."""
+    """Every hard case, or those in folders or variants of these ``names``; InputError for a name without a case."""
     found = [hard for folder in folders() for hard in read(FOLDER / folder / "case.toml")]
     own = [{hard.name, hard.name.partition(".")[0]} for hard in found]
     for name in names:
@@ -198,7 +215,7 @@ def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one cannot be posed."""
+    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one is invalid."""
     table, folder = texts.toml(path), path.parent.name
     if "variant" not in table:
         yield _hard(table, folder, str(path))
@@ -223,9 +240,11 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
             raise InputError(join(where, key), "an unknown key", f"one of {', '.join(keys(Hard))}")
     if "effect" in table:
         table = table | {"effect": casefile.effects(table["effect"], where)}
+    if isinstance(several := table.get("beside"), list):
+        table = table | {"beside": [_with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
-        want = 'nothing beside "no_solution", which no run should reach the end of'
+        want = 'nothing beside "no_solution", as no run should reach its end'
         raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
     scene = hard.shipped.read() if hard.shipped else None
     task: Task = scene.task if scene else "solve"
@@ -242,6 +261,13 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
         raise InputError(join(where, "steps.until"), hard.steps.until, want)
     return hard
+
+
+def _with_effects(one: Any, where: str) -> Any:
+    """A body beside, with the effects that its table names."""
+    return (
+        one | {"effect": casefile.effects(one["effect"], where)} if isinstance(one, dict) and "effect" in one else one
+    )
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:

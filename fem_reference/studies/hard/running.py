@@ -21,7 +21,7 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
-from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.of_case import CaseProblem, mechanical
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import Candidate, SolverChoice
@@ -35,7 +35,7 @@ from fem_reference.studies.law_split import LAW
 log = logging.getLogger(__name__)
 
 LONGER = 600.0  # [s] of processor time of all runs of a case, in several numbers of load steps or on several meshes
-# How messages name a place at rest [mm].
+# A place at rest [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
@@ -45,10 +45,10 @@ class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught
 
 @dataclass(eq=False)
 class Posed:
-    """A hard case with the problem that it poses, made once, and the reference's run of it (``truth``: positions and frames).
+    """A hard case with its problem, made once, and the reference's run of it (``truth``: positions and frames).
 
-    ``in_steps``: the reference goes to its farthest frame in several numbers of load steps, whether the case asks or not;
-    ``jitters``: on how many other meshes it runs.
+    ``in_steps``: the reference goes to its farthest frame in several numbers of load steps, even if the case does not ask for it;
+    ``jitters``: the number of other meshes on which it runs.
     """
 
     hard: Hard
@@ -58,9 +58,9 @@ class Posed:
 
     @cached_property
     def problem(self) -> CaseProblem:
-        """The problem; InputError where the case cannot be posed."""
+        """The problem; InputError where the case is invalid."""
         if self.hard.block is not None:
-            return blocks.problem(self.hard)
+            return blocks.several(self.hard) if self.hard.beside else blocks.problem(self.hard)
         shipped = self.hard.shipped
         assert shipped is not None  # a Hard record has one of the two
         case = shipped.read()
@@ -75,8 +75,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Every solver, or ``only`` these, and those of one's ``own`` on each case, the reference first; it also ``in_steps`` and on
-    so many ``jitters``. Of one's own: the effects that it takes beside those of a law of the whole muscle, None where not known.
+    """Run every solver, or ``only`` these, and the user's ``own`` on each case, the reference first, and this also ``in_steps`` and
+    on a number of other meshes, ``jitters``. ``own``: for each, the effects that it models beside a law of the whole muscle, None
+    if unknown.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
@@ -96,8 +97,8 @@ def run(
 
 
 def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
-    """The cell of a case by a solver: never an exception. Not applicable where it leaves out an effect: it ``takes`` all that it
-    can beside a law, or is not known to leave out any.
+    """The cell of a case by a solver; a failure is a verdict, never an exception. Not applicable where the solver leaves out an
+    effect: ``takes`` lists those that it models beside a law, None if unknown.
     """
     begin = time.perf_counter()
     hard, solver = posed.hard, choice.solver
@@ -106,8 +107,8 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
             return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
-        if takes is not None and posed.problem.muscle is not None:
-            acting = dict.fromkeys(name_of(one) for one in posed.problem.muscle.effects)
+        if takes is not None and (problem := mechanical(posed.problem)) is not None:
+            acting = dict.fromkeys(name_of(one) for one in problem.effects)
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
                 return Cell(
                     hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
@@ -120,7 +121,7 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
         found = Cell(hard.name, solver, "failed", "timed out: it took too much processor time", "timed out")
     except StalledError as why:
         found = Cell(hard.name, solver, "inconclusive", f"stalled: {why}", "stalled")
-    except Exception as error:  # whatever a solver does wrong is what this measures
+    except Exception as error:  # an error of a solver is a result here
         log.info("%s, %s: %r", hard.name, solver, error, exc_info=True)
         found = Cell(hard.name, solver, "failed", f"crashed: {type(error).__name__}: {error}", "crashed")
     return replace(found, seconds=time.perf_counter() - begin)
@@ -128,15 +129,17 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise _Late after so many seconds of this process's processor time, and StalledError after many times as long by the clock,
-    in the main thread; processes of the reference have a limit of their own.
+    """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as long by the clock,
+    both only in the main thread; processes of the reference have a limit of their own.
     """
 
     def late(*_: object) -> None:
         raise _Late
 
     def stalled(*_: object) -> None:
-        raise StalledError(f"more than {CLOCK * seconds:g} s by the clock, and not {seconds:g} s of processor time")
+        raise StalledError(
+            f"more than {CLOCK * seconds:g} s by the clock, but less than {seconds:g} s of processor time"
+        )
 
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -154,12 +157,12 @@ def _limited(seconds: float) -> Iterator[None]:
 
 
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
-    """The cell of a solver that is asked for the case."""
+    """The cell of a solver that attempts the case."""
     hard, solver = posed.hard, choice.solver
     if posed.problem.field is not None:  # settings for bodies do not matter there
         choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
     outcome, followed = follow(posed.problem, choice)
-    if solver == REFERENCE and posed.problem.muscle is not None and outcome.status == "converged":
+    if solver == REFERENCE and posed.problem.field is None and outcome.status == "converged":
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
@@ -177,7 +180,7 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
     histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
     begins = followed.least_determinant
     if hard.start is not None and begins is not None and not begins[0] > 0:
-        said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {blank.status}"
+        said = f"the start has det F down to {begins[0]:.2g}, but this solver needs more than 0: {blank.status}"
         return replace(blank, verdict="not applicable", sentence=said)
     if blank.status != "converged":
         return stress.unfinished(blank, message, histories, hard.no_solution)
@@ -186,20 +189,20 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
     """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
-    hard, muscle = posed.hard, posed.problem.muscle
-    if muscle is None or choice.solver != REFERENCE:
+    hard, built = posed.hard, mechanical(posed.problem)
+    if built is None or choice.solver != REFERENCE:
         return
-    asked = posed.in_steps and hard.start is None and not muscle.body.rubs  # with friction the end depends on the path
+    asked = posed.in_steps and hard.start is None and not built.body.rubs  # with friction the end depends on the path
     wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
-        yield following.in_steps(muscle, choice, wanted)
+        yield following.in_steps(built, choice, wanted)
     if posed.jitters:
         first = outcome, followed
         yield following.on_meshes(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The deciding frame (of an unfinished run its last) as a picture with the named place; None without a finite surface."""
+    """The decisive frame (the last one of an unfinished run) with the place named in its message; None without a finite surface."""
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
     points, history = followed.positions[i], found.history

@@ -48,3 +48,32 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
 def test_what_no_mesh_and_no_direction_resolves_is_refused(name, got, want) -> None:
     with pytest.raises(InputError, match=f"got {got}, want less.*{want}"):
         _ = blocks.problem(CASES[name]).body
+
+
+def test_bodies_beside_a_block_are_muscles_of_one_problem() -> None:
+    built = blocks.several(CASES["neighbours.row"])
+    assert list(built.problems) == ["block", "middle", "upper"]
+    assert built.pairs == (("block", "middle"), ("block", "upper"), ("middle", "upper"))
+    assert built.apart
+    names = [bone.name for bone in built.bones]
+    assert len(names) == len(set(names)) == 3
+    for one in built.problems.values():
+        assert one.bones == built.bones
+        assert all(entry.bone in one.bones for entry in one.attached)
+        assert one.body.touching == ()  # none touches itself
+    hard = CASES["neighbours.stiff"]
+    soft, stiff = blocks.several(hard).problems.values()
+    assert [one.effects[0].mu for one in (soft, stiff)] == [0.01, 10.0]
+    alone = blocks.several(hard.model_copy(update={"effect": hard.effect[:2]}))
+    assert (alone.law, alone.pairs, alone.apart) == (None, (), True)
+
+
+def test_a_rounded_block_is_between_a_box_and_an_ellipsoid() -> None:
+    """Corners of a cube are at the root of 3, those of a ball at 1; the middles of faces stay."""
+    block = records.Lattice(size="2, 4, 6 mm", cells=(2, 2, 2), corner="-1, -2, -3 mm", rounding=0.7)
+    hard = CASES["at_rest.millimetres"].model_copy(update={"block": block})
+    unit = blocks.problem(hard).mesh.points / [1, 2, 3]
+    away = np.sort(np.linalg.norm(unit, axis=1))
+    assert away[0] == 0
+    assert away[1:7] == pytest.approx(np.ones(6))
+    assert away[-8:] == pytest.approx(np.full(8, 0.3 * np.sqrt(3) + 0.7))

@@ -100,7 +100,7 @@ def test_jitters_are_other_meshes_of_the_same_body_compared_at_the_same_material
 
     same = following.on_meshes(hard, bent(hard), 2, bent)
     assert same == following.SameEnd(
-        True, "jitters: 2 converged, up to frame 0, apart by 0.5 % at most, 0.25 % in the median"
+        True, "on other meshes: 2 converged, up to frame 0, apart by 0.5 % at most, 0.25 % in the median"
     )
     assert not following.on_meshes(hard, bent(hard), 3, bent).same
 
@@ -111,3 +111,23 @@ def test_jitters_of_a_shipped_case_have_tetrahedra_of_another_size() -> None:
     given = hard.shipped.read().muscle.tet_size
     assert sizes[0] != sizes[1]
     assert all(0 < abs(size / given - 1) < following.SIZES for size in sizes)
+
+
+def test_bodies_in_each_other_are_compared_each_with_itself() -> None:
+    """Where two bodies overlap, a point has its place in the mesh of its own."""
+    hard = CASES["neighbours.overlap"]
+
+    def lifted(one: records.Hard) -> tuple[Outcome, health.Followed]:
+        built = blocks.several(one)
+        rest, (_, upper), shift = built.rest, built.spans, np.array([0, 0, 5.0])
+        points, nodes = np.array(rest.surface.points), np.array(rest.mesh.points)
+        points[upper.vertices] += shift
+        nodes[upper.points] += shift
+        followed = health.Followed((0,), rest.surface, points[None], rest.mesh, nodes[None], spans=built.spans)
+        return Outcome("converged", ""), followed
+
+    meshes = [blocks.several(following.jittered(hard, number)).rest.mesh.points for number in (1, 2)]
+    assert not np.array_equal(*meshes)
+    same = following.on_meshes(hard, lifted(hard), 2, lifted)
+    assert same.same
+    assert float(same.sentence.split("apart by ")[1].split(" %")[0]) < 1e-6

@@ -37,6 +37,7 @@ frames = { first = 0, last = 2, every = 1 }
 """
 CONTACT = 'effect = [{ name = "contact", stiffness = "500 kPa/mm", bones = ["d"] }]\n'
 SPHERE = 'bone = [{ name = "c", sphere = { centre = "0, 0, 200 mm", radius = "5 mm" } }'
+BESIDE = 'beside = [{ name = "c", block = { size = "9, 9, 9 mm", cells = [1, 1, 1] }, hold = [] }]\n'
 ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 1 }]\n'
 
 
@@ -64,6 +65,11 @@ ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 
         ("frames", CONTACT + SPHERE + "]\nframes", r'effect\[0\].bones: got "d", want one of c'),
         ("frames", SPHERE + SPHERE.replace("bone = [", ", ") + "]\nframes", 'bone: got the name "c" twice'),
         ("frames", 'effect = [{ name = "inertia", density = "1 g/ml" }]\nframes', "frames.interval: got nothing, want the time"),
+        ("frames", BESIDE + "start = { kind = 'point' }\nframes", 'want "beside" with a "block", without a "start"'),
+        ("frames", BESIDE.replace('"c"', '"block"') + "frames", 'no body named "block", as the first is'),
+        ("frames", BESIDE.replace("hold", "effect = [{ mu = 1 }], hold") + "frames", r"beside\[0\].effect\[0\].name: got"),
+        ("frames", BESIDE.replace("cells", "cell") + "frames", r"beside\[0\].block.cell: got an unknown key"),
+        ("frames", "beside = 3\nframes", "beside: got 3"),
         ("frames", "variant = 3\nframes", "variant: got 3, want tables"),
         ("frames", "variant = [3]\nframes", r"variant: got \[3\], want tables"),
         ("frames", "variant = []\nframes", r"variant: got \[\], want tables"),
@@ -91,7 +97,7 @@ def test_a_mistake_in_a_file_is_no_refusal_by_a_solver(old, new, message, tmp_pa
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('title = "a"\nhealthy = "b"\n[[bound]]\nquantity = "colour"\nat_most = 1', "as colour is not"),
+        ('title = "a"\nhealthy = "b"\n[[bound]]\nquantity = "colour"\nat_most = 1', "colour is none of them"),
         ('title = "a"\nhealthy = "b"', "bound: got nothing"),
         ("title = ", "a TOML file"),
     ],
