@@ -277,7 +277,7 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm]: by the ``pressure`` [MPa], the error of the distance, and points half of ``apart`` [mm] apart."""
+    """The allowed penetration [mm] under a ``pressure`` [MPa], for contact points half of ``apart`` [mm] apart."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * apart

@@ -85,6 +85,11 @@ class MusclesProblem:
         return next(iter(self.problems.values())).frames
 
     @property
+    def bones(self) -> tuple[Bone, ...]:
+        """The bones, which all muscles share."""
+        return next(iter(self.problems.values())).bones
+
+    @property
     def free(self) -> NDArray[np.bool_]:
         """Mask (n,) of the vertices of all surfaces that may be in contact with bones."""
         return np.concatenate([one.free for one in self.problems.values()])

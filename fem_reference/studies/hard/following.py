@@ -13,7 +13,6 @@ from fem_reference.assessment.health import Followed
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.of_case import CaseProblem, MechanicalProblem, at_frames, effects_of, mechanical
 from fem_reference.problems.problem import NO_SURFACE
@@ -95,7 +94,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
         np.array([frame.surface for frame in frames if frame.surface is not None]),
         built.rest.mesh if whole else None,
         np.array(tets) if whole else None,
-        built.bones if isinstance(built, MuscleProblem) else next(iter(built.problems.values())).bones,
+        built.bones,
         built.free,
         integrated=scalar("volume_ratio"),
         negative_modes=scalar("negative_modes"),
