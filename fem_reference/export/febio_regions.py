@@ -29,8 +29,10 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters of a part are within this factor of each other; what is less than this share of the greatest counts as that.
+# Parameters of a part are within this factor of each other; fibres of less than this share of the greatest count as that.
 FACTOR, _LEAST = 1.2, 0.01
+# The parameters of fibres, which end where a region does.
+_OF_FIBRES = ("stress", "c3", "c5")
 # The points of a quadrature of degree 2 in a tetrahedron, by the shares of its corners.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
 _POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
@@ -61,7 +63,7 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
     known = shares(problem)
     if not known:
         return (Piece(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
-    levels = np.stack([_levels(one) for one in _parameters(problem, known)], axis=1)
+    levels = np.stack([_levels(*one) for one in _parameters(problem, known)], axis=1)
     _, which, counts = np.unique(levels, axis=0, return_inverse=True, return_counts=True)
     volumes, found = tet_volumes(problem.mesh.points, problem.mesh.tets), list[Piece]()
     for number, kind in enumerate(np.argsort(-counts, kind="stable"), start=1):
@@ -72,20 +74,20 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
     return tuple(found)
 
 
-def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[Floats]:
-    """The parameters (m,) of each tetrahedron: sums over the effects of a kind, of fibres, whose laws differ, by effect."""
+def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[str, Floats]]:
+    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind, of fibres, whose laws differ, by effect."""
     found = dict[tuple[object, str], Floats]()
     for i, effect in enumerate(problem.effects):
         for key in SCALED.get(type(effect), ()):
             of = (i if isinstance(effect, FibrePassive) else type(effect), key)
             amount = known.get(region_of(effect), np.ones(len(problem.mesh.tets))) * getattr(effect, key)
             found[of] = found.get(of, 0.0) + amount
-    return list(found.values())
+    return [(key, values) for (_, key), values in found.items()]
 
 
-def _levels(values: Floats) -> Ints:
-    """The number (m,) of the interval that each of positive ``values`` (m,) is in."""
-    least = max(_LEAST * float(values.max()), np.finfo(float).tiny)
+def _levels(key: str, values: Floats) -> Ints:
+    """The number (m,) of the interval that each of ``values`` (m,) of a parameter is in."""
+    least = max(_LEAST * float(values.max()) if key in _OF_FIBRES else 0.0, np.finfo(float).tiny)
     return np.asarray(np.round(np.log(np.maximum(values, least)) / np.log(FACTOR)), np.int64)
 
 
@@ -101,7 +103,8 @@ def note(problem: MuscleProblem) -> list[str]:
     """A sentence on the parts, where there are regions."""
     many = len(parts(problem))
     text = (
-        f"regions are {many} materials, each in tetrahedra whose parameters are within a factor of {FACTOR:g}, with their mean: "
+        f"regions are {many} materials, each in tetrahedra whose parameters are within a factor of {FACTOR:g} (those of "
+        f"fibres where they are at least {_LEAST:.0%} of the greatest), with their mean: "
         "constant in each tetrahedron, at every quadrature point in the reference"
     )
     return [text] if many > 1 else []

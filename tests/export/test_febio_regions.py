@@ -20,7 +20,7 @@ from fem_reference.geometry.regions import Blended
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 
-MU, STIFF = 0.01, 1.0  # [MPa]
+MU = 0.01  # [MPa]
 WITHIN = febio_regions.FACTOR - 1  # of the parameters of a part
 LENGTH, WIDTH = 10.0, 20.0  # [mm]: where the tendon begins, and the transition beyond
 
@@ -34,20 +34,22 @@ def law(name: str, region: str, **parameters: Any) -> Effect:
     return effects.make(name, **parameters).model_copy(update={"region": region})
 
 
-def tendinous(*more: Effect, width: float = WIDTH) -> MuscleProblem:
-    """A bar of 30 mm that becomes a tendon, with the bones of the shared one and more laws."""
+def tendinous(*more: Effect, width: float = WIDTH, stiff: float = 1.0) -> MuscleProblem:
+    """A bar of 30 mm that becomes a tendon of a ``stiff`` shear modulus [MPa], with the bones of the shared one and more laws."""
     acting = (
         law("neo_hooke", "not tendon", mu=MU),
-        law("neo_hooke", "tendon", mu=STIFF),
+        law("neo_hooke", "tendon", mu=stiff),
         law("incompressible", "not tendon", bulk=1000 * MU),
-        law("incompressible", "tendon", bulk=100 * STIFF),
+        law("incompressible", "tendon", bulk=100 * stiff),
     )
     return replace(feb_file.bar(), effects=(*acting, *more), regions={"tendon": Blended(depth, width)})
 
 
-@pytest.fixture(scope="module")
-def problem() -> MuscleProblem:
-    return tendinous(law("fibre_passive", "not tendon", **effects.example("fibre_passive")))
+@pytest.fixture(scope="module", params=[1.0, 100.0])
+def problem(request: pytest.FixtureRequest) -> MuscleProblem:
+    """With a tendon a hundred times as stiff as the muscle, or ten thousand times."""
+    fibres = law("fibre_passive", "not tendon", **effects.example("fibre_passive"))
+    return tendinous(fibres, stiff=request.param)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +77,7 @@ def test_each_tetrahedron_is_in_one_part_once(feb: Element, problem: MuscleProbl
 
 def test_materials_are_the_laws_times_their_shares(feb: Element, problem: MuscleProblem) -> None:
     """The stiffness rises a hundredfold: in each tetrahedron it is that of the mean share, as near as parts are."""
-    share = Blended(depth, WIDTH)
+    share, stiff = Blended(depth, WIDTH), problem.effects[1].mu
     stress = next(one.stress for one in problem.effects if isinstance(one, FibrePassive))
     # A quadrature of 20 x 20 x 20 points, by barycentric shares, for the one of four.
     random = np.random.default_rng(1).dirichlet(np.ones(4), 8000)
@@ -83,8 +85,8 @@ def test_materials_are_the_laws_times_their_shares(feb: Element, problem: Muscle
         corners = problem.mesh.points[feb_file.cells(feb, name)[:, :4] - 1]
         means = np.array([share(random @ points).mean() for points in corners])
         at = {key: [float(one.text or "") for one in material.iter(key)] for key in ("c1", "k", "smax")}
-        assert 2 * at["c1"][0] == pytest.approx(MU + means * (STIFF - MU), rel=WITHIN)
-        assert at["k"][0] == pytest.approx(1000 * MU + means * (100 * STIFF - 1000 * MU), rel=WITHIN)
+        assert 2 * at["c1"][0] == pytest.approx(MU + means * (stiff - MU), rel=WITHIN)
+        assert at["k"][0] == pytest.approx(1000 * MU + means * (100 * stiff - 1000 * MU), rel=WITHIN)
         assert sum(at["smax"]) == pytest.approx(stress * (1 - means), rel=WITHIN, abs=1e-6 * stress)
 
 
@@ -92,17 +94,18 @@ def test_the_stiffness_of_all_is_kept(problem: MuscleProblem) -> None:
     """What a part has in all is what its tetrahedra have: nothing is lost by the parts."""
     volumes = tet_volumes(problem.mesh.points, problem.mesh.tets)
     inner = febio_regions.shares(problem)["tendon"]
+    tendon = problem.effects[1].mu
     stiff = sum(
         sum(getattr(one, "mu", 0.0) for one in part.effects) * volumes[part.cells].sum()
         for part in febio_regions.parts(problem)
     )
-    assert stiff == pytest.approx(volumes @ (MU + inner * (STIFF - MU)), rel=1e-12)
+    assert stiff == pytest.approx(volumes @ (MU + inner * (tendon - MU)), rel=1e-12)
 
 
 def test_a_jump_that_follows_facets_is_two_materials() -> None:
     """No effect that has no share is in a part: FEBio has no law of zero stiffness."""
     found = febio_regions.parts(tendinous(width=0.0))
-    assert [[one.mu for one in part.effects if hasattr(one, "mu")] for part in found] == [[STIFF], [MU]]
+    assert [[one.mu for one in part.effects if hasattr(one, "mu")] for part in found] == [[1.0], [MU]]
     assert [len(part.cells) for part in found] == [48, 24]  # thirds of 72
 
 
