@@ -75,7 +75,10 @@ Found = tuple[Floats, list[str] | None, Floats | None]
 
 
 def volume(run: Followed) -> Found:
-    """Change of the enclosed volume, in per cent of that at rest."""
+    """Change of the enclosed volume, in per cent of that at rest; of several bodies the greatest."""
+    if run.spans:
+        changes = np.array([volume(one)[0] for one in run.bodies])
+        return np.max(changes, axis=0), None, None
     if run.integrated is not None:
         return 100 * np.abs(run.integrated - 1), None, None
     triangles, whole = run.surface.triangles, enclosed_volume(run.surface.points, run.surface.triangles)

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, worst
+from fem_reference.assessment.run_checks import ROUNDING, Nodes, RunCheck, RunChecks, worst
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.geometry.skins import edge_lengths
@@ -37,7 +37,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
         name = f"{pair[0].name} and {pair[1].name} in each other"
         for i, number in enumerate(run.numbers):
             give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
-            allowed = give + (_BULGE * edge if pressures[i] > 0 else 0.0)
+            allowed = ROUNDING * edge + give + (_BULGE * edge if pressures[i] > 0 else 0.0)
             if (now := nodes(number)) is None:
                 checks.append(RunCheck(f"{name} (no tetrahedra are stored)", np.nan, allowed, "mm", number))
                 continue

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import platformdirs
@@ -82,6 +82,7 @@ class MuscleProblem(Setup):
     skin: Skin | None = None
     attached_skins: dict[str, Skin] = field(default_factory=dict)
     mesh_facts: dict[str, float | str] = field(default_factory=dict)
+    spans: ClassVar[tuple[()]] = ()  # of several muscles
     seconds: float = 0.0
 
     @cached_property

@@ -39,9 +39,11 @@ def mechanical(built: CaseProblem) -> MechanicalProblem | None:
 
 
 def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
-    """The effects of one muscle, or of all."""
-    each = [built] if isinstance(built, MuscleProblem) else built.problems.values()
-    return tuple(effect for one in each for effect in one.effects)
+    """The effects of one muscle, or of all and between them."""
+    if isinstance(built, MuscleProblem):
+        return built.effects
+    found = tuple(effect for one in built.problems.values() for effect in one.effects)
+    return found if built.law is None else (*found, built.law)
 
 
 def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalProblem:

@@ -231,7 +231,7 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
         assert stated[name].startswith(f"{bars[0]} to {bars[-1]} "), name
     bar, value, where = re.fullmatch(r"(\S+) of (\S+) kPa in the mean \((\w+)\)", stated["Stress"]).groups()
     (said,) = [one for one in text.split("\n\n") if "mean stress along the fibres" in one]
-    assert f"{value} ± {bar} kPa" in said
+    assert f"the mean stress along the fibres is {value} ± {bar} kPa" in " ".join(said.split())
     assert f"`{where}`" in said
     assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {
         "by --error-bar, by case",

@@ -36,5 +36,9 @@ def test_bodies_in_each_other_are_crossed_and_a_body_that_is_not_finite_is_not_k
     found = health.history(run, "crossed")
     assert found.values == pytest.approx([0, 100 * 1.0 / run.size, np.nan], nan_ok=True)
     assert 9 <= found.points[1][2] <= 10
+    # One keeps its volume and the other goes down to 70 % of its height: the greatest change counts, not that of the sum.
+    lower = np.array(positions)
+    lower[1, upper.vertices] = rest.surface.points[upper.vertices] * [1, 1, 0.7]
+    assert health.history(replace(run, positions=lower), "volume").values[:2] == pytest.approx([0, 30])
     # As one body, whose surface goes through itself.
     assert health.history(replace(run, spans=()), "crossed").values[:2] == pytest.approx([0, 100 * 1.0 / run.size])

@@ -49,7 +49,7 @@ def often(names, at_night=AT_NIGHT):
     return [pytest.param(name, marks=pytest.mark.nightly) if name in at_night else name for name in names]
 
 
-# Cases in which this is the same would show the same: the first of them. All soften the bulk: the main job by day is enough.
+# Cases in which this is the same would show the same: the first of them. By day the main job is enough, as most soften the bulk.
 CONTROLS = list({spoiled(name): name for name in reversed([MAIN_JOB, *sorted(SOLVED, key=AT_NIGHT.count)])}.values())
 
 

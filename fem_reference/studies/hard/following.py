@@ -13,7 +13,6 @@ from fem_reference.assessment.health import Followed
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.of_case import CaseProblem, MechanicalProblem, at_frames, effects_of, mechanical
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.states import VALUES
@@ -22,7 +21,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies.hard.records import Hard, Lattice, StepCounts, task_of
+from fem_reference.studies.hard.records import REFERENCE, SECOND, Hard, Lattice, StepCounts, task_of
 
 _MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
@@ -49,6 +48,8 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     solver, task, muscle = choice.solver, task_of(choice.solver, built.task), mechanical(built)
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
+    if muscle is not None and muscle.spans and solver not in (REFERENCE, SECOND):
+        raise InputError(solver, "a solver of a single body", "one that solves several")
     if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
         want = "one that moves a surface, whose health is measured"
         raise InputError(solver, f"a solver that moves {offer.moves}", want)
@@ -100,7 +101,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
         negative_modes=scalar("negative_modes"),
         material_modes=scalar("material_modes"),
         least_determinant=np.min(known, axis=0) if known else None,
-        spans=built.spans if isinstance(built, MusclesProblem) else (),
+        spans=built.spans,
     )
 
 
@@ -192,4 +193,4 @@ def _apart(one: Followed, other: Followed) -> float:
             at = Locator(second.mesh).embed(first.surface.points)
             moved = np.array([at.interpolate(second.mesh, nodes) for nodes in second.nodes[:both]])
         off.append(float(np.linalg.norm(first.positions[:both] - moved, axis=2).max()))
-    return 100 * max(off) / one.size
+    return 100 * float(np.max(off)) / one.size

@@ -11,6 +11,7 @@ from fem_reference import solvers
 from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
 from fem_reference.effects import Effect
+from fem_reference.effects.touching import among as touching_among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import FileName, Name, Record, join, keys, one_of, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
@@ -151,6 +152,13 @@ class Hard(Record):
         if all(bound.quantity == "from_reference" for bound in bounds):
             raise ValueError("another quantity beside from_reference, which a run without a reference lacks")
         return bounds
+
+    @field_validator("beside")
+    @classmethod
+    def _check_beside(cls, others: tuple[OtherBody, ...]) -> tuple[OtherBody, ...]:
+        if any(touching_among(one.effect) for one in others):
+            raise ValueError('"touching" among the effects of the first block, as it acts between all')
+        return others
 
     @field_validator("hold")
     @classmethod

@@ -70,6 +70,11 @@ ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 
         ("frames", BESIDE.replace("hold", "effect = [{ mu = 1 }], hold") + "frames", r"beside\[0\].effect\[0\].name: got"),
         ("frames", BESIDE.replace("cells", "cell") + "frames", r"beside\[0\].block.cell: got an unknown key"),
         ("frames", "beside = 3\nframes", "beside: got 3"),
+        (
+            "frames",
+            BESIDE.replace("hold", 'effect = [{ name = "touching", stiffness = "1 MPa/mm", smoothing = "1 mm" }], hold') + "frames",
+            'want "touching" among the effects of the first block',
+        ),
         ("frames", "variant = 3\nframes", "variant: got 3, want tables"),
         ("frames", "variant = [3]\nframes", r"variant: got \[3\], want tables"),
         ("frames", "variant = []\nframes", r"variant: got \[\], want tables"),
