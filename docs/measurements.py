@@ -230,7 +230,7 @@ def _credibility_verified() -> str:
         "closed forms; entries of the catalogue",
         "required orders of convergence",
         "other codes",
-        "numerical bar, of the shipped cases on their own meshes",
+        "numerical bar, of shipped cases",
     )
     return table("credibility", head, rows)
 
