@@ -1,6 +1,4 @@
-"""Checks of all states that a solver calls converged, from its recorded positions and forces, independent of its loop. A check has
-its allowed value, and the frame and place where it comes nearest to it or exceeds it most.
-"""
+"""Checks of the states that a solver calls converged, from recorded positions and forces, independent of the solver's loop."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -63,9 +61,7 @@ class RunCheck:
     @property
     def share(self) -> float:
         """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
-        if self.allowed == 0:
-            return 0.0 if self.met else math.inf
-        return math.inf if math.isnan(share := self.value / self.allowed) else share
+        return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:
         value, allowed = ("not a number" if one is None else f"{one:.3g}" for one in (self.value, self.allowed))
@@ -256,8 +252,8 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
     for i, number in _states(run, problem.obstacles):
         muscle = run.surface.moved_to(run.positions[i])
         for bone in problem.obstacles:
-            allowed = give(problem, bone, float(pressures[i]), apart)
-            check_of = partial(_deep, bone, number, allowed, pressed=bool(pressures[i] > 0))
+            pressure = float(pressures[i])
+            check_of = partial(_deep, bone, number, give(problem, bone, pressure, apart), pressed=pressure > 0)
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
                 check = min(check, check_of(skin().moved_to(now), skin()), key=lambda one: one.share)
@@ -281,9 +277,7 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] of a bone: the compliance of contact under the recorded ``pressure`` [MPa], the error of the
-    bone's distance, and the part between contact points, which are half of ``apart`` [mm] apart.
-    """
+    """The allowed penetration [mm] under a ``pressure`` [MPa], for contact points half of ``apart`` [mm] apart."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * apart

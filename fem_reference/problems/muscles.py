@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.effects import Effect
 from fem_reference.effects import contact as contacts
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
@@ -89,12 +88,6 @@ class MusclesProblem:
     def bones(self) -> tuple[Bone, ...]:
         """The bones, which all muscles share."""
         return next(iter(self.problems.values())).bones
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The effects of all muscles, and the contact between them."""
-        found = tuple(effect for one in self.problems.values() for effect in one.effects)
-        return found if self.law is None else (*found, self.law)
 
     @property
     def free(self) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import enclosed_volume
@@ -35,6 +36,12 @@ CaseProblem = MechanicalProblem | FieldProblem
 def mechanical(built: CaseProblem) -> MechanicalProblem | None:
     """The problem, if it is of one muscle or several; None for a field."""
     return None if isinstance(built, FieldProblem) else built
+
+
+def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
+    """The effects of one muscle, or of all."""
+    each = [built] if isinstance(built, MuscleProblem) else built.problems.values()
+    return tuple(effect for one in each for effect in one.effects)
 
 
 def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalProblem:

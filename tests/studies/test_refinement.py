@@ -87,7 +87,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     status, facts = call(case, "run")
     assert (status, facts["error_bars"], facts["verdicts"][0]["error_bar"]) == (cli.VERDICT_FAIL, [], None)  # it swells
     page = case.parent / "out" / "bar-reference" / "report.html"
-    assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
+    assert "With <code>--error-bar</code> the reference is also solved" in page.read_text()
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
@@ -196,7 +196,9 @@ def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
     monkeypatch.setattr(refinement, "RATIO", 1.0)
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
-    with pytest.raises(InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size that a coarser"):
+    with pytest.raises(
+        InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size for which a coarser"
+    ):
         refinement.obtain(bench, reference)
 
 

@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscles import MusclesProblem
-from fem_reference.problems.of_case import CaseProblem, MechanicalProblem, at_frames, mechanical
+from fem_reference.problems.of_case import CaseProblem, MechanicalProblem, at_frames, effects_of, mechanical
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.states import VALUES
 from fem_reference.runs.store import Frame, Outcome
@@ -57,7 +57,7 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, for correctness and not for speed"
         raise InputError(solver, f"{tets} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
-    solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
+    solvers.check(solver, settings, effects_of(muscle) if muscle else (), solver, task)
     solvers.find(solver, solver, task).require(settings)
     frames = list[Frame]()
     outcome = offer.solve(built.body if as_body else built, settings, frames.append)

@@ -21,7 +21,7 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import MachineTime, spent_since
 from fem_reference.problems import of_case
-from fem_reference.problems.of_case import CaseProblem, mechanical
+from fem_reference.problems.of_case import CaseProblem, effects_of, mechanical
 from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import Candidate, SolverChoice
@@ -108,7 +108,7 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
         if takes is not None and (problem := mechanical(posed.problem)) is not None:
-            acting = dict.fromkeys(name_of(one) for one in problem.effects)
+            acting = dict.fromkeys(name_of(one) for one in effects_of(problem))
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
                 return Cell(
                     hard.name, solver, "not applicable", f"it leaves out effects of this case: {', '.join(lacks)}"
