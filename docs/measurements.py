@@ -126,7 +126,8 @@ def _bodies_rows() -> str:
         measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
-    head = ("", "shipped material", "with cells twice as large and half the steps", "measured", "", _RESTS)
+    coarse = "on cells twice as large, in half the load steps"
+    head = ("", "shipped material", coarse, "measured; for the ball the fitted law", "", _RESTS)
     return table("bodies", head, rows)
 
 
@@ -211,8 +212,8 @@ def _credibility_grades() -> str:
         met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
         said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
-    experiment = ("measurements met within their uncertainty", "deviation of the others", "specimens, by source")
-    head = ("quantity", "grade", "compared", *experiment, "other models matched as required", "model band")
+    experiment = ("measurements met", "deviation of the others", "specimens, by source")
+    head = ("quantity", "grade", "compared", *experiment, "other models matched (no evidence)", "model band")
     return table("credibility", head, rows)
 
 
@@ -229,7 +230,7 @@ def _credibility_verified() -> str:
         "closed forms; entries of the catalogue",
         "required orders of convergence",
         "other codes",
-        "numerical bar",
+        "numerical bar, of shipped cases",
     )
     return table("credibility", head, rows)
 
@@ -307,7 +308,12 @@ def _credibility_arms() -> str:
                 *offsets,
             )
         )
-    shares = ("inside, or covered", "from 0 to 57 degrees only", "required", "Modenese and Kohout's fibres")
+    shares = (
+        "share of the poses, or of the range",
+        "from 0 to 57 degrees only",
+        "required",
+        "Modenese and Kohout's fibres",
+    )
     poses = ("flexion, degrees", "poses", "bias", "scatter over the poses", "change on larger tetrahedra")
     return table("credibility", ("case", "compared with", *shares, *poses), rows)
 

@@ -17,9 +17,11 @@ from fem_reference.report.pages import Page
 
 COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case goes through
 GRADES = {
-    "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
-    "indicative": "within what single specimens, quotations or memory say",
-    "outside": "the model differs from a measurement of muscle by more than the uncertainty of that",
+    "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
+    "model is from memory",
+    "indicative": "within the uncertainty of every measurement, but all by one specimen, a quotation, a fit or memory",
+    "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
+    "within the range of the fibres in all poses",
     "verified only": "the equations are solved right; no measurement of muscle is laid beside it",
     "not measured": "the data of its experiment is not here",
 }
@@ -80,7 +82,7 @@ def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
     if lost := sum(map(math.isnan, missed)):
         said.append(f"{lost} without a number")
     if orders:
-        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} orders wrong")
+        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} orders of stiffness wrong")
     return "; ".join(said)
 
 

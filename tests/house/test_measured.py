@@ -10,6 +10,8 @@ import measurements
 import pages
 import pytest
 
+from fem_reference.assessment import credibility, experiments
+
 
 def test_the_pages_have_the_tables_that_are_kept() -> None:
     assert measured.write_pages(check=True) == []
@@ -18,6 +20,26 @@ def test_the_pages_have_the_tables_that_are_kept() -> None:
 def test_every_table_has_its_place() -> None:
     places = re.findall(r"<!-- (?:measured|written): (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
     assert set(places) == set(measured.WRITTEN)
+
+
+def test_the_three_bars_side_by_side_are_those_of_their_sources() -> None:
+    """Numerical bars and model bands of the evidence by quantity, and the greatest widths of the bands of two cases, rounded."""
+    text = pages.page("docs/validation.md").partition("## Three bars\n")[2]
+    numerical, parameters, models = (
+        next(line for line in text.splitlines() if line.startswith(f"| **{name}"))
+        for name in ("numer", "param", "model")
+    )
+    for one in credibility.claims():
+        if one.name in ("Volume", "Fibre length", "Surface"):
+            assert f"± {one.bar.removesuffix(' rms')}" in numerical
+        if one.band:
+            low, high = (fact.value for fact in experiments.model_band(one.band))
+            assert f"{low:g} to {high:g} {experiments.model_band(one.band)[0].unit}" in models
+    kept = [measurements.kept(name)["measured"]["bands"] for name in ("uncertainty", "uncertainty_iliacus")]
+    first, second = ({one["quantity"]: one["width"] for one in bands} for bands in kept)
+    for quantity in ("surface_deviation.rms", "fibre_length.mean"):
+        assert f"{first[quantity]:.1f} and {second[quantity]:.1f} mm" in parameters
+    assert f"{first['force on femur']:.0f} and {second['force on femur']:.2f} N" in parameters
 
 
 @pytest.mark.parametrize("name", measurements.MEASUREMENTS)
