@@ -135,7 +135,7 @@ def _distinct(rows: Floats) -> tuple[Floats, Ints]:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points with contact, outside the ``exempt`` part, ``apart`` [mm] apart at most on average, carried by a ``mesh``."""
+    """The material points with contact, outside the ``exempt`` part, on average at most ``apart`` [mm] apart; in a ``mesh``."""
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

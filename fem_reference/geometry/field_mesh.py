@@ -159,8 +159,8 @@ def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Float
 @cache
 def rule(corners: int) -> tuple[Floats, Floats]:
     """Barycentric coordinates (q, k) of the points of a quadrature rule for cells with k ``corners``, 2 or 3, and its weights (q,),
-    whose sum is 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate Calculation of
-    Multiple Integrals, 2.4).
+    whose sum is 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate
+    Calculation of Multiple Integrals, 2.4).
     """
     x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2
