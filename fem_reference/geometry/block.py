@@ -1,6 +1,6 @@
-"""Grids of boxes, each cut into Kuhn's six tetrahedra in the same directions: refined grids are nested.
+"""Grids of boxes, each cut into Kuhn's six tetrahedra, all along the same diagonals, so that refined grids are nested.
 
-A cell is cut along the diagonal from its lowest to its highest corner, and so is every face of it.
+Each cell, and each of its faces, is cut along the diagonal from its lowest to its highest corner.
 """
 
 from itertools import permutations
@@ -13,7 +13,7 @@ from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
 
-_SAME = 1e-6  # of the largest edge: the precision of a single-precision coordinate
+_SAME = 1e-6  # tolerance relative to the largest edge: the precision of single-precision coordinates
 
 
 def fill(surface: Surface, size: float) -> TetMesh:
@@ -42,7 +42,7 @@ def kuhn(counts: Counts) -> tuple[Ints, Ints]:
 
 
 def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
-    """The nodes (n, 3) on the faces of such a lattice, and outward triangles (m, 3) between them: the skin of its tets."""
+    """The nodes (n, 3) on the faces of a lattice of ``counts`` cells, and the outward triangles (m, 3) of the skin of its tets."""
     sheets = [_sheet(counts, axis, end) for axis in range(3) for end in (0, 1)]
     corners = np.concatenate(sheets).reshape(-1, 3)
     nodes, triangles = np.unique(corners, axis=0, return_inverse=True)
@@ -61,7 +61,7 @@ def _sheet(counts: Counts, axis: int, end: int) -> Ints:
 
 
 def _extent(surface: Surface) -> tuple[Floats, Floats]:
-    """The lowest and the highest corner (3,) of an axis-aligned box with this ``surface``; InputError where it is no box."""
+    """The lowest and the highest corner (3,) of an axis-aligned box with this ``surface``; InputError where it is not a box."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = _SAME * float((high - low).max())
     corners = surface.points[surface.triangles]

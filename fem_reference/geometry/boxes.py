@@ -1,4 +1,4 @@
-"""Axis-aligned boxes around triangles and points, and a search for those of two sets that may touch."""
+"""Axis-aligned bounding boxes of triangles and points, and a search for the boxes of two sets that may touch."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
-# Cells of the grid along the longest edge of the region that two sets have in common.
+# Cells of the search grid along the longest edge of the common region of two sets.
 _CELLS = 16
 
 
@@ -40,23 +40,23 @@ def boxes_of(surface: Surface) -> Boxes:
 
 
 def around(points: Floats, reach: Floats) -> Boxes:
-    """Boxes that extend by ``reach`` (n,) [mm] from ``points`` (n, 3) to all sides."""
+    """Boxes that extend by ``reach`` (n,) [mm] from ``points`` (n, 3) in all directions."""
     return Boxes(points.T - reach, points.T + reach)
 
 
 def touching(one: Boxes, other: Boxes) -> tuple[Ints, Ints]:
-    """The boxes (k,) and (l,) of either set that may touch one of the other set: all that do, and few that do not."""
+    """The indices (k,) and (l,) of the boxes of each set that may touch a box of the other: all that do, and few that do not."""
     others = reached(one, other)
     return _near(other, others, one), others
 
 
 def reached(one: Boxes, other: Boxes) -> Ints:
-    """The boxes (k,) of ``other`` that may touch one of the first set: all that do, and few that do not."""
+    """The indices (k,) of the boxes of ``other`` that may touch a box of ``one``: all that do, and few that do not."""
     return _near(one, np.arange(one.low.shape[1]), other)
 
 
 def _near(one: Boxes, some: Ints, other: Boxes) -> Ints:
-    """The boxes (k,) of ``other`` whose low corner is in a grid cell that ``some`` of ``one`` reach, extended by the largest."""
+    """The boxes (k,) of ``other`` whose low corner is in a grid cell that ``some`` of ``one`` reach, enlarged by the largest."""
     if not (len(some) and other.low.size):
         return np.zeros(0, np.int64)
     begin, end = np.take(one.low, some, axis=1) - other.largest, np.take(one.high, some, axis=1)

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats
 
-# The four Bernstein coefficients of a cubic (rows) by those of the B-splines that reach into its cell: weights of means.
+# Weights that make the four Bernstein coefficients of a cubic (rows) from the B-spline coefficients that reach into its cell.
 _BERNSTEIN = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6
-_CHUNK = 20_000  # cells at once
+_CHUNK = 20_000  # cells per chunk
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """``away`` (i, j, k): the distance [mm] from each node to the nearest cell in which the spline may fall to the level. Nodes
-    are ``spacing`` [mm] apart, the first at ``origin``; the spline stays above the level beyond the last ones.
+    are ``spacing`` [mm] apart, the first at ``origin``; outside the grid the spline stays above the level.
     """
 
     away: Floats
@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below where there may be none; NaN for NaN."""
+        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below where none is certain; NaN for NaN."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -52,8 +52,8 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell it is no lower than
-    the least of the 64 coefficients there, nor than the least of its Bernstein coefficients; it is no higher than the greatest
-    coefficient, so cells deep inside need no check.
+    the least of the 64 coefficients there, nor than the least of its Bernstein coefficients. It is no higher than the greatest
+    coefficient, so that cells deep inside need no check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))
@@ -66,5 +66,5 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least of four neighbours along each axis, which gets shorter by three."""
+    """The least of four consecutive values along each axis; the result is shorter by three along each."""
     return np.asarray(scipy.ndimage.minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

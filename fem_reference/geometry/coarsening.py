@@ -8,19 +8,19 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-# Chosen on four hip muscles and a box. More rounds gain nothing.
+# Chosen by trials on four hip muscles and a box; more rounds improve nothing.
 _ROUNDS = 6
-# A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving
-# along it keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
+# A vertex may move along a direction if the squares of the normals around it have less than this share along it: the vertex then
+# stays on its plane or sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers remain.
 _FREE = 0.03
-# Distance of the inversion's pole in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
+# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
 
 
 def coarsen(surface: Surface, count: int) -> Surface:
-    """A closed surface of about ``count`` triangles on a closed one: sharp edges kept, the same volume enclosed.
+    """A closed surface of about ``count`` triangles on a closed ``surface``, with its sharp edges and its enclosed volume.
 
     Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849), then edges flip towards
     Delaunay and vertices slide to the middle of their neighbours, back on ``surface`` after each round.
@@ -46,7 +46,7 @@ def resampled(surface: Surface, power: int) -> Surface:
 
 
 def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
-    """Points and triangles after quadric collapses, in a sphere inversion: on flat parts quadrics are undetermined."""
+    """Points and triangles after quadric collapses of the inverted surface: in a flat part quadrics would be undetermined."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     radius = _POLE * float(np.linalg.norm(high - low))
     pole = (low + high) / 2 + radius * np.array([0.48, 0.6, 0.64])
@@ -81,7 +81,7 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """Sum over the triangles around each point of their angle there times ``n n^T``, n the unit normal, (n, 3, 3)."""
+    """The sums (n, 3, 3) over the triangles around each point of their angle at it times ``n n^T``, with their unit normal n."""
     across = unit_normals(points[triangles])
     squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))
@@ -115,7 +115,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """The triangles after flips of worthwhile edges, the best first, each triangle at most once; the same array without flips."""
+    """The triangles after flips of edges with a gain, the greatest first, each triangle at most once; the same array if none."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -136,7 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] of the angles opposite to edges over a straight one; 0 where a flip is useless or would bend."""
+    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 where a flip is useless or would bend."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

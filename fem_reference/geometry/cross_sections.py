@@ -1,4 +1,4 @@
-"""Sections of a muscle where a field has a value, as triangles, each mapped to the unit square.
+"""Sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
 
 Rims of consecutive sections are matched point by point, so that a changing outline does not turn lines along the muscle.
 """
@@ -11,17 +11,17 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
 
-# A point whose value is this close to the level counts as above it: no triangle may have two corners in one place.
+# A point whose value is this close to the level counts as above it, so that no triangle has two corners in one place.
 _NUDGE = 1e-4
 # The unit square's boundary, counter-clockwise from the middle of its side x = 1, by shares of its length.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
-_SAMPLES = 360  # points of a rim that are matched
-_REACH = 60  # samples by which a match may be ahead of the shift of the whole rim, or behind it
-_STEPS = (-1, 0, 1, 2, 3)  # samples that a match may gain on the one before, so that matches stay in order
-_STIFFNESS = 0.01  # share of a rim's length: stretching the rim to twice its length costs as much as a distance of it
-_WINDOW = 9  # samples whose mean smooths a match
-_LEAST = 0.1  # share of the plain shift in a match, so that no two points coincide
+_SAMPLES = 360  # points on each rim that are matched
+_REACH = 60  # samples by which a match may deviate from the common shift of the rim, either way
+_STEPS = (-1, 0, 1, 2, 3)  # samples by which consecutive matches may differ, so that matches stay in order
+_STIFFNESS = 0.01  # share of a rim's length: stretching a rim to twice its length costs as much as points that lie this far apart
+_WINDOW = 9  # samples in the moving mean that smooths the matches
+_LEAST = 0.1  # weight of the common shift in a match, so that no two points coincide
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class CrossSection:
 
     @property
     def moments(self) -> tuple[Floats, Floats]:
-        """The centre of area (3,) [mm] and the mean product (3, 3) [mm2] of the distances from it."""
+        """The centroid (3,) [mm] and the mean product (3, 3) [mm2] of the components of the distance from it."""
         corners = self.points[self.triangles]
         areas = np.linalg.norm(normals(corners), axis=1) / 2
         centre = areas @ corners.mean(axis=1) / areas.sum()
@@ -51,10 +51,10 @@ class CrossSection:
         return loop if upward else loop[::-1]
 
     def turns(self, first: Floats) -> Floats:
-        """The place (k,) of each point of the rim around the unit square, in turns from the middle of its side x = 1;
+        """The position (k,) of each point of the rim around the unit square, in turns from the middle of the square's side x = 1;
         ``first`` (3,) is the direction of its first side.
 
-        They are shares of length after a stretch that makes the section as wide as high, so that a rectangle is mapped linearly.
+        It is a share of length after a stretch that makes the section as wide as high, so that a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
@@ -62,13 +62,13 @@ class CrossSection:
         return _around((self.points[self.rim] - centre) @ axes.T @ (vectors / np.sqrt(values)) @ vectors.T)
 
     def square(self, turns: Floats) -> Floats:
-        """The place (n, 2) in the unit square of each point, by a harmonic map; ``turns`` (k,) are those of the rim."""
+        """The position (n, 2) of each point in the unit square, by a harmonic map; ``turns`` (k,) are the positions of the rim."""
         rim = np.stack([np.interp(turns, _SHARES, side) for side in _SQUARE], axis=1)
         return np.asarray(igl.harmonic(self.points, self.triangles.astype(np.int64), self.rim, rim, 1))
 
 
 def _around(loop: Floats) -> Floats:
-    """Shares (k,) of the length of a counter-clockwise ``loop`` (k, 2), from the farthest place where it meets the first axis."""
+    """Shares (k,) of the length of a counter-clockwise ``loop`` (k, 2), from its farthest crossing of the first axis."""
     ahead = np.roll(loop, -1, axis=0)
     lengths = np.linalg.norm(ahead - loop, axis=1)
     rises = np.flatnonzero((loop[:, 1] < 0) & (ahead[:, 1] >= 0))
@@ -80,8 +80,8 @@ def _around(loop: Floats) -> Floats:
 
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:
-    """The greatest piece of the section of a ``mesh`` where ``values`` (n,) at its points are ``level``; None where that piece
-    has holes or there is none. Its normal has the direction of increase.
+    """The largest piece of the section of a ``mesh`` on which the field of ``values`` (n,) at its points is ``level``; None if it
+    has holes or there is none. Its normal points towards greater values.
     """
     above = values - level
     above = np.where(np.abs(above) < _NUDGE, _NUDGE, above)
@@ -99,7 +99,7 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
 
 
 def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
-    """For each triangle that a section cuts from a tet the three cut edges (k, 3, 2), and a direction (k, 3) of increase."""
+    """The three cut edges (k, 3, 2) for each triangle in which a section cuts a tet, and a direction (k, 3) of increase."""
     order = np.take_along_axis(mesh.tets, np.argsort(above[mesh.tets], axis=1, kind="stable"), axis=1)
     below = (above[order] < 0).sum(axis=1)
     patterns = {
@@ -114,7 +114,7 @@ def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
 
 
 def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
-    """The piece of the greatest area, if it has one boundary only."""
+    """The piece of the largest area, or None if it has more than one boundary."""
     _, pieces = igl.facet_components(triangles.astype(np.int64))
     areas = np.bincount(pieces, weights=np.linalg.norm(normals(points[triangles]), axis=1))
     triangles = triangles[pieces == np.argmax(areas)]
@@ -128,10 +128,10 @@ def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
 
 
 def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
-    """The places (m,) around the unit square of the ``other`` section's rim, from those (n,) of the ``known`` one's.
+    """The positions (m,) of the ``other`` section's rim along the unit square, from those, ``turns`` (n,), of the ``known`` one's.
 
     The points of the other rim are matched in order with points of the known one, so that the mean square of their distance across
-    the muscle is least, and with it a cost of stretch.
+    the muscle plus a cost of stretch is least.
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
@@ -148,23 +148,23 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
 
 
 def _shares(rim: Floats) -> Floats:
-    """The shares (k,) of its length from the first point of a closed ``rim`` (k, 3) to each."""
+    """The shares (k,) of the length of a closed ``rim`` (k, 3) from its first point to each."""
     lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
 
 
 def _at(places: Floats, shares: Floats, rim: Floats) -> Floats:
-    """Points (n, 3) at ``places`` (n,) of a closed ``rim`` (k, 3) that has its points at ``shares`` (k,)."""
+    """Points (n, 3) at ``places`` (n,), shares of the length, of a closed ``rim`` (k, 3) whose points are at ``shares`` (k,)."""
     return np.stack([np.interp(places, shares, axis, period=1) for axis in rim.T], axis=1)
 
 
 def _continued(places: Floats, known: Floats, values: Floats) -> Floats:
-    """Cyclic values (n,) at cyclic ``places`` (n,), between ``values`` (k,) at ``known`` places (k,) around a rim, all in turns."""
+    """Values (n,) at ``places`` (n,) around a rim, interpolated from ``values`` (k,) at ``known`` places (k,), all in turns."""
     return places + np.interp(places, known, np.unwrap(values - known, period=1), period=1)
 
 
 def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
-    """The place at which a closed ``rim`` (k, 3) is nearest to a ``point`` (3,)."""
+    """The position, as a share of its length, at which a closed ``rim`` (k, 3) is nearest to a ``point`` (3,)."""
     ahead = np.roll(rim, -1, axis=0) - rim
     squares = np.maximum((ahead**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((point - rim) * ahead).sum(axis=1) / squares, 0, 1)
@@ -187,7 +187,7 @@ def _matched(one: Floats, other: Floats) -> Floats:
 
 
 def _least(apart: Floats, stiffness: float) -> Ints:
-    """The gains (n,) from -60 to 60 of least sum of squares ``apart`` (n, 121), with a cost of each step; the first is 0."""
+    """The shifts (n,), from -60 to 60, of least sum of squares ``apart`` (n, 121) plus a cost of their changes; the first is 0."""
     count, width = apart.shape
     costs, steps = np.full(width, np.inf), np.zeros((count + 1, width), np.int64)
     costs[_REACH] = apart[0, _REACH]

@@ -1,7 +1,7 @@
 """Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
-are misprinted: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and the matrix (3.2) is that of the uniform spline, not of
+have misprints: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and the matrix (3.2) is that of the uniform spline, not of
 the centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
 """
 
@@ -64,7 +64,7 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
 
 
 def fourier(points: Floats) -> Curve:
-    """The discrete Fourier series of ``points`` (n, d), taken as equidistant, and as periodic without their chord (3.4, 3.5).
+    """The discrete Fourier series of ``points`` (n, d), taken as equidistant, and as periodic up to their chord (3.4, 3.5).
 
     The chord, the straight line between both ends, is subtracted first and the rest extended as an odd function, so that the
     curve passes through the ends.
@@ -77,16 +77,16 @@ def fourier(points: Floats) -> Curve:
 
 
 def radial(points: Floats, shape: float = 3.0) -> Curve:
-    """Gaussian radial basis functions with a linear polynomial through ``points`` (n, d) by chord length (3.6, 3.10).
+    """Gaussian radial basis functions plus a linear polynomial that interpolate ``points`` (n, d) by chord length (3.6, 3.10).
 
-    ``shape``: the length of the curve over the width of a Gaussian.
+    ``shape``: the length of the curve divided by the width of a Gaussian.
     """
     times = knots(points)
     found = scipy.interpolate.RBFInterpolator(times[:, None], points, kernel="gaussian", epsilon=shape, degree=1)
     return lambda t: np.asarray(found(np.asarray(t, dtype=float)[:, None]))
 
 
-# Each technique by the name that pages and scenes use, with the smoothness of its curves: of class C^-1, C^0, ...
+# The techniques by the names that pages and scenes use, with the class of smoothness of their curves: C^-1, C^0, ...
 TECHNIQUES: dict[str, tuple[Callable[[Floats], Curve], float]] = {
     "constant": (constant, -1),
     "piecewise linear": (linear, 0),

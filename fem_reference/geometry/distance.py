@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, normals
 
-# The distance of the sample point outside a triangle, as a share of the surface's diagonal.
+# The distance of a sample point just outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
-# Triangles within another part whose depth is measured: those farthest from the uncovered ones.
+# The number of triangles within another part whose depth is measured: those farthest from the uncovered triangles.
 _WITHIN = 16
 
 
@@ -45,10 +45,10 @@ def distances(points: Floats, surface: Surface) -> Distances:
     return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, inner)
 
 
-# A surface is often queried for few points at a time, and building its tree takes as long as thousands of them.
+# A surface is often queried for few points at a time, and building its search tree takes as long as thousands of queries.
 @lru_cache(maxsize=8)
 def _tree(points: bytes, triangles: bytes) -> igl.AABB:
-    """The boxes around parts of the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""
+    """A search tree of boxes for the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""
     tree = igl.AABB()
     tree.init(*_arrays(points, triangles))
     return tree
@@ -76,7 +76,7 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
 
 
 def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) that a closed ``surface`` winds round."""
+    """Mask (n,) of the ``points`` (n, 3) inside a closed ``surface``, by winding number."""
     if len(points) == 0:
         return np.zeros(0, bool)
     tree = _winding_tree(surface.points.tobytes(), surface.triangles.tobytes())
@@ -84,8 +84,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def flattened(surface: Surface, place: Floats) -> float:
-    """The error of a flat triangle on a curved surface, times the radius of curvature [mm2], of the triangle nearest to a ``place``
-    (3,) [mm]: the distance of its middle from a sphere through its corners, times the radius of the sphere.
+    """The error of a flat triangle on a curved surface times the radius of curvature [mm2]: its middle's distance from a sphere
+    through its corners, times the radius of the sphere. The triangle is the one nearest to a ``place`` (3,) [mm].
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
@@ -111,8 +111,8 @@ def outer_windings(surface: Surface) -> Floats:
 
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
-    """A lower bound of the greatest depth [mm] of middles of the triangles ``some`` (m,) within another part of the closed
-    ``surface``: the distance of such a middle to the nearest opposing triangle in front of it. 0 without self-intersection.
+    """A lower bound of the greatest depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
+    ``surface``: the distance of a centroid to the nearest opposing triangle in front of it. 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]
     middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5
@@ -130,7 +130,7 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """The indices (count,) of ``points`` (n, d): the farthest from their mean first, then each the farthest from those before."""
+    """The indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from those chosen."""
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

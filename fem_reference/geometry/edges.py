@@ -20,7 +20,7 @@ class Edges:
 
     @classmethod
     def of(cls, surface: Surface) -> "Edges":
-        """The edges of a closed, consistently oriented surface at rest; their areas sum to its own."""
+        """The edges of a closed, consistently oriented surface at rest; their areas sum to that of the surface."""
         triangles = surface.triangles
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
         sides = twins(triangles)
@@ -38,7 +38,7 @@ class Edges:
 
         0 where the two are flat, pi / 2 at the edges of a box, below 0 where the surface is hollow; NaN where a triangle
         has no normal. It is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge:
-        report eq. 5.23 without its arccos, which has neither a sign nor digits for small angles.
+        report eq. 5.23 without its arccos, which loses the sign and, for small angles, the digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start

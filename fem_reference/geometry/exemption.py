@@ -1,4 +1,4 @@
-"""The part of a surface that is exempt from contact: attached parts, and parts near to them on the same side."""
+"""The part of a surface that is exempt from contact: attached parts, and parts near them on the same side."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from fem_reference.geometry.skins import Pieces, Skin, cut, embedded, points, sp
 
 # A part that faces more than 120 degrees away from an attached part is on the other side of a thin body.
 _SAME_SIDE = -0.5
-# Corners are sampled at this share of the path to the middle of their piece: on an edge that has one side.
+# Corners are sampled at this share of the way to the middle of their piece, so that a point on an edge belongs to one side.
 _INWARD = 1e-3
 
 
 class Corners(NamedTuple):
     """The distinct corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) from positions of the vertices to
-    theirs, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the number ``by`` (k,) of that attachment; the
-    corners ``at`` (p, 3) of each piece, and those at the ``vertices`` (n,).
+    theirs, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the index ``by`` (k,) of that attachment; the
+    corners ``at`` (p, 3) of each piece, and the corner at each of the ``vertices`` (n,).
     """
 
     carried: csr_array
@@ -34,10 +34,10 @@ class Corners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each ``by`` (r,) the
-    number of an attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
+    """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each with the
+    index ``by`` (r,) of its attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
 
-    The reach is the ``spacing`` of the contact points: the area of a point nearer to the attached part would include attached
+    The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached
     area. It depends on the size of the surface and not on its triangles.
     """
 
@@ -49,8 +49,8 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """The exemption of a surface. ``attached``: by attachment, the name of the bone and the shares (m, 3) of the corners of
-        the triangles, 1 or 0; the attached part is where shares, linear in triangles, are at least a half.
+        """The exemption of a surface. ``attached``: for each attachment the name of the bone and the shares (m, 3) of the corners
+        of the triangles, 1 or 0; the attached part is where these shares, linear in triangles, are at least a half.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
@@ -60,8 +60,8 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite where that faces
-        away, and the number of its attachment (k,).
+        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite where that part
+        faces away, and the index (k,) of its attachment.
         """
         if len(self.part) == 0:
             return np.full(len(points), np.inf), np.full(len(points), -1)
@@ -78,7 +78,7 @@ class Exemption:
 
     @cached_property
     def corners(self) -> Corners:
-        """The corners of the pieces, each with the distance from its piece nearest to the attached part."""
+        """The corners of the pieces, each with the least distance from the attached part among its pieces."""
         triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
         weights = pieces.corners.reshape(-1, 3)
         named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
@@ -104,17 +104,17 @@ class Exemption:
 
     @cached_property
     def felt(self) -> NDArray[np.bool_]:
-        """Mask (p,) of the pieces with contact in their middle."""
+        """Mask (p,) of the pieces whose middle can be in contact."""
         return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
 
     def places(self, count: int) -> csr_array:
-        """About ``count`` evenly chosen places with contact: the matrix from positions of the vertices to theirs."""
+        """About ``count`` evenly chosen points that can be in contact, as the matrix from positions of the vertices to theirs."""
         felt = np.flatnonzero(self.corners.away > self.reach)
         return self.corners.carried[felt[:: max(1, len(felt) // count)]]
 
     @cached_property
     def lost(self) -> float:
-        """The share of the unattached surface without contact; 1 where all is attached."""
+        """The share of the unattached surface that is exempt from contact; 1 where all is attached."""
         areas = corner_areas(self._places)
         loose = areas.sum() - corner_areas(self.part).sum()
         return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0
@@ -126,7 +126,7 @@ class Exemption:
 
 
 def _distinct(rows: Floats) -> tuple[Floats, Ints]:
-    """The distinct ``rows`` (k, d), sorted, and the number (n,) of each row among them: ``np.unique`` in a seventh of its time."""
+    """The distinct ``rows`` (k, d), sorted, and the index (n,) of each row among them: seven times as fast as ``np.unique``."""
     order = np.lexsort(rows.T[::-1])
     first = np.append(True, (np.diff(rows[order], axis=0) != 0).any(axis=1))
     number = np.empty(len(rows), np.int64)
@@ -135,7 +135,7 @@ def _distinct(rows: Floats) -> tuple[Floats, Ints]:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points with contact, outside the ``exempt`` part, on average ``apart`` [mm] at most, carried by a ``mesh``."""
+    """The material points with contact, outside the ``exempt`` part, on average at most ``apart`` [mm] apart; in a ``mesh``."""
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

@@ -1,4 +1,4 @@
-"""One fixed linear extension of a surface's displacement to points inside it, the same for every run of a case.
+"""A fixed linear extension of a surface's displacement to points inside, the same for every run of a case.
 
 Mean value coordinates for closed triangle meshes: Ju, Schaefer, Warren 2005, doi 10.1145/1073204.1073229.
 """
@@ -10,9 +10,9 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.distance import distances
 
-# Closer to the surface than this share of its diagonal a point counts as on it.
+# A point closer to the surface than this share of its diagonal counts as on it.
 _ON = 1e-10
-# A triangle whose plane passes the point at a sine below this counts as edge-on: its solid angle is 0.
+# A triangle seen from the point at an angle to its plane with a sine below this counts as edge-on: its solid angle is 0.
 _EDGE_ON = 1e-10
 
 
@@ -48,7 +48,7 @@ class Extension:
 
 class _Edges:
     """The e edges of m ``triangles`` (m, 3): their ``ends`` (2, e); and for each corner of the triangles the edge ``opposite`` to
-    it (3, m), with the ``sense`` (3, m) of the triangle along it, 1 or -1.
+    it (3, m), with the direction ``sense`` (3, m), 1 or -1, in which the triangle runs along it.
     """
 
     def __init__(self, triangles: Ints) -> None:
@@ -69,7 +69,7 @@ def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:
     rays = rest - point
     lengths = np.sqrt(np.einsum("nk,nk->n", rays, rays))
     units = np.ascontiguousarray((rays / lengths[:, None]).T)
-    first, second = units.take(edges.ends, axis=1).transpose(1, 0, 2)  # several times as fast as indices in brackets
+    first, second = units.take(edges.ends, axis=1).transpose(1, 0, 2)  # several times as fast as indexing with brackets
     products = np.cross(first, second, axis=0)
     sines = np.sqrt(np.einsum("ke,ke->e", products, products))
     angles = np.arctan2(sines, np.einsum("ke,ke->e", first, second))

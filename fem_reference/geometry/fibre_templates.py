@@ -2,7 +2,7 @@
 
 Their method uses isocontours on the surface. Here each contour is the rim of a section of the Laplace field in tetrahedra, and a
 harmonic map of that section gives the points inside. These are in the muscle; between sections, lines may leave it where it bends.
-A muscle with several heads is followed along its greatest section only; where that gains or loses a head, lines still turn.
+A muscle with several heads is followed along its largest section only; where it gains or loses a head, lines are twisted.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from fem_reference.geometry.fibres import POINTS, FibreField, resample
 from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
-_WINDOW = 7  # points of a line through which smoothing lays a parabola
-_FLAT = 1e-9  # twice the area of a triangle in the unit square below which its points are on one side
-_SHORTEST = 0.1  # of the longest pennate fibre's extent along the muscle
+_WINDOW = 7  # points of a line through which smoothing fits a parabola
+_FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
+_SHORTEST = 0.1  # least length of a pennate fibre, as a share of the extent of the longest along the muscle
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """``sections`` of a muscle from one attachment to the other, the place of their points in the unit ``squares``, and their
-    ``heights`` (k,) between 0 and 1, by length along their centres; ``length`` of that line [mm].
+    """``sections`` of a muscle from one attachment to the other, the positions of their points in the unit ``squares``, and their
+    ``heights`` (k,) between 0 and 1 along the line through their centres, whose length is ``length`` [mm].
     """
 
     sections: tuple[CrossSection, ...]
@@ -41,7 +41,7 @@ class Contours:
         return float(np.mean([np.linalg.norm(np.diff(self._on(i, sides), axis=0)) for i in range(len(self.sections))]))
 
     def place(self, cube: Floats) -> Floats:
-        """Points (n, 3) [mm] of places (n, 3) in the unit ``cube``, linear between sections and beyond the last."""
+        """Points (n, 3) [mm] for positions (n, 3) in the unit ``cube``, linear between sections and beyond the last."""
         last = len(self.heights) - 2
         below = np.clip(np.searchsorted(self.heights, cube[:, 2], side="right") - 1, 0, last)
         found = np.empty_like(cube)
@@ -53,7 +53,7 @@ class Contours:
         return found
 
     def _on(self, i: int, places: Floats) -> Floats:
-        """Points (n, 3) on section ``i`` of ``places`` (n, 2) in its square."""
+        """Points (n, 3) on section ``i`` for the positions ``places`` (n, 2) in its square."""
         square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
         triangles = triangles[np.linalg.norm(normals(square[triangles]), axis=1) > _FLAT]
         found = distances(np.pad(places, ((0, 0), (0, 1))), Surface(square, triangles))
@@ -64,8 +64,8 @@ class Contours:
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
-    The first side of the middle one's square is along ``towards`` (3,), without it along its longest axis; the others follow from
-    section to section by the nearest points of their rims.
+    The first side of the middle section's square is along ``towards`` (3,) or, if None, along its longest axis; the squares of the
+    others follow from section to section by the nearest points of their rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
@@ -86,7 +86,7 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
 
 
 def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
-    """The unit vector (3,) in the ``middle`` section along ``towards``, or its longest axis, whose greatest part is positive."""
+    """The unit vector (3,) in the ``middle`` section along ``towards``, or the longest axis, its largest component positive."""
     if towards is None:
         longest = np.linalg.eigh(product)[1][:, 2]
         towards = longest * np.sign(longest[np.argmax(np.abs(longest))])
@@ -98,7 +98,7 @@ def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Flo
 
 def template(count: int, slope: float) -> Floats:
     """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton): parallel to its third axis, or
-    inclined to the first axis by the ``slope`` and cut off at the cube's sides.
+    inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
     """
     across = halton(count, 2)
     margin = _SHORTEST * min(slope, 1.0)
@@ -135,7 +135,7 @@ def _samples(ends: Floats, heights: Floats) -> Floats:
 
 def _smooth(line: Floats) -> Floats:
     """The line (40, 3) with each point on the parabola nearest to it and six neighbours; the ends stay."""
-    from scipy.signal import savgol_filter  # half a second, with scipy.stats
+    from scipy.signal import savgol_filter  # the import takes half a second, with scipy.stats
 
     found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
     found[[0, -1]] = line[[0, -1]]

@@ -18,9 +18,9 @@ from fem_reference.geometry.nested import EDGES
 
 POINTS = 40  # of each line
 _NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
-# Seeds whose relative difference is less are ordered by their number, so that a turned mesh gives the same lines.
+# Seeds whose relative difference is below this are ordered by their index, so that a rotated mesh gives the same lines.
 _TIES = 1e-6
-_HALFWAY = 0.5 - _TIES  # a field of 1/2 up to round-off is above it
+_HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to round-off is above it
 
 Bools = NDArray[np.bool_]
 # From cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); picklable.
@@ -40,13 +40,13 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields without those derived from others, for other processes."""
+        """The state without cached properties, for other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), independent of their ``cells``."""
         found = self.directions(points)
-        flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all around is one attachment
+        flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all points around belong to one attachment
         if flat.any():
             mean = self.gradients.mean(axis=0)
             found[flat] = mean / np.linalg.norm(mean)
@@ -54,7 +54,7 @@ class FibreField:
 
     @cached_property
     def locator(self) -> Locator:
-        """Finds points in the mesh."""
+        """Search trees that locate points in the mesh."""
         return Locator(self.mesh)
 
     @cached_property
@@ -77,7 +77,7 @@ class FibreField:
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
     """A Laplace field in the tetrahedra of a muscle, by linear elements: 0 on the facets ``start`` of the ``mesh``, 1 on ``end``,
-    without flux elsewhere; 1/2 where they touch, as they may on a coarse mesh.
+    without flux elsewhere; 1/2 where the two touch, as they may on a coarse mesh.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -91,7 +91,7 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
 def trace(field: FibreField, count: int) -> Polylines:
     """``count`` lines of 40 points each along ``field``, from one attachment to the other.
 
-    They are spread over the section halfway; InputError when the muscle has room for fewer.
+    They are spread over the section halfway; InputError if fewer can be traced.
     """
     seeds = _seeds(field)
     if len(seeds) == 0:
@@ -109,7 +109,7 @@ def trace(field: FibreField, count: int) -> Polylines:
 
 @dataclass(frozen=True, eq=False)
 class NearestLine:
-    """Directions along the segment of ``lines`` whose middle is nearest."""
+    """Fibre directions: at a point that of the segment of ``lines`` whose middle is nearest."""
 
     lines: Polylines
 
@@ -135,7 +135,7 @@ class NearestLine:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """The ``directions`` of fibres, each turned by a matrix (3, 3)."""
+    """The ``directions`` of fibres, all rotated by one matrix (3, 3)."""
 
     directions: Directions
     matrix: Floats
@@ -162,7 +162,7 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut, and halfway to its corners."""
+    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut and halfway to its corners."""
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
@@ -179,7 +179,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, d), the most central first, then each the farthest from those before it."""
+    """At most ``count`` of ``points`` (k, d), first the most central, then always the farthest from those chosen."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
@@ -198,7 +198,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
     going, points = np.arange(len(seeds)), seeds
-    # A line four times as long as the mesh goes in circles.
+    # A line four times as long as the mesh must run in circles.
     for _ in range(4 * int(field.locator.diagonal / abs(step))):
         points = _runge_kutta(field, points, step)
         goes_on = field.between_attachments(points)
@@ -214,7 +214,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
 
 
 def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:
-    """``points`` (k, 3) one step [mm] further, by the classical fourth order rule."""
+    """``points`` (k, 3) advanced by one ``step`` [mm], with the classical fourth-order Runge-Kutta method."""
     first = field.directions(points)
     second = field.directions(points + step / 2 * first)
     third = field.directions(points + step / 2 * second)
@@ -223,7 +223,7 @@ def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:
 
 
 def resample(line: Floats) -> Floats:
-    """The line (k, 3) by 40 points at equal distances along it."""
+    """The line (k, 3) resampled at 40 points, equally spaced along it."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     at = np.linspace(0, along[-1], POINTS)
     return np.stack([np.interp(at, along, line[:, axis]) for axis in range(3)], axis=1)

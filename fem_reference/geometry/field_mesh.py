@@ -33,19 +33,19 @@ class FieldMesh:
 
     @property
     def facets(self) -> Ints:
-        """The facets that belong to one cell only: vertices (f, 1) of an interval's ends, edges (f, 2) of a rim."""
+        """The facets that belong to one cell only: the end vertices (f, 1) of an interval, the rim edges (f, 2) of triangles."""
         parts = self.cells.reshape(-1, 1) if self.cells.shape[1] == 2 else _all_edges(self.cells)
         unique, sides = np.unique(parts, axis=0, return_counts=True)
         return np.asarray(unique[sides == 1])
 
     def edge_numbers(self, pairs: Ints) -> Ints:
-        """The number (k,) among ``edges`` of each of ``pairs`` (k, 2) of vertices; all must be edges."""
+        """The index (k,) in ``edges`` of each of the ``pairs`` (k, 2) of vertices; all must be edges."""
         key = np.array([len(self.points), 1])
         return np.asarray(np.searchsorted(self.edges @ key, np.sort(pairs, axis=1) @ key))
 
     @property
     def nodes(self) -> dict[int, Floats]:
-        """The places of the nodes of Lagrange elements of order 1 and 2: the vertices, then the middles of the edges."""
+        """The positions of the nodes of Lagrange elements of order 1 and 2: the vertices, then the midpoints of the edges."""
         middles = self.points[self.edges].mean(axis=1)
         return {1: self.points, 2: np.concatenate([self.points, middles])}
 
@@ -59,7 +59,7 @@ class FieldMesh:
 
 
 POINTS = 5  # of the quadrature rules along each direction: exact up to degree 9
-# The greatest coordinate, so that areas and results computed from it are finite.
+# The largest coordinate that is allowed, so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
 
@@ -98,7 +98,7 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
     """The share (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner that is alone on its side of the level is cut off: the area is as the product of the shares of its two edges.
+    # The corner that is alone on its side of the level is cut off; its share of the area is the product of those of its two edges.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)
@@ -110,7 +110,7 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
     """The greatest Peclet number of all cells and, of each (m,), the parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)`` of upwinding.
 
     ``Pe = |v| h / 2k``, with ``diffusion`` k, v the part of the ``velocity`` (d,) along the cell and h the distance of nodes along
-    it, ``2|v| / sum |v . grad lambda|`` over the ``order`` of the elements (Brooks and Hughes 1982, doi
+    v, ``2|v| / sum |v . grad lambda|`` over the ``order`` of the elements (Brooks and Hughes 1982, doi
     10.1016/0045-7825(82)90071-8; h after Tezduyar 1986). On an interval it makes linear elements exact at their nodes for constant
     coefficients.
     """
@@ -120,13 +120,13 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
     along = np.einsum("mid,mik,k->md", tangents, slopes[:, 1:], velocity)
     with np.errstate(divide="ignore", invalid="ignore"):
         peclet = np.where(rates > 0, (along**2).sum(axis=1) / (2 * diffusion * rates), 0.0)
-        # Below 1e-3 the difference loses its digits; its series is Pe / 3 - Pe^3 / 45 + ...
+        # Below 1e-3 the difference suffers cancellation; its series is Pe / 3 - Pe^3 / 45 + ...
         upwind = np.where(peclet > 1e-3, 1 / np.tanh(peclet) - 1 / peclet, peclet / 3)
         return float(peclet.max()), np.where(rates > 0, upwind / (2 * rates), 0.0)
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Intervals cut in two, triangles in four at the middles of edges; vertex i stays vertex i, edge j becomes vertex n + j."""
+    """Intervals cut in two, triangles in four at edge midpoints; vertex i stays vertex i, the middle of edge j is vertex n + j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T
@@ -145,8 +145,8 @@ def _all_edges(cells: Ints) -> Ints:
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
     """The L2 norm over a ``mesh`` of intervals or triangles, in the plane or in space, of a Lagrange function minus an ``exact``
-    one, which gives values (q,) at points (q, d). The function has ``values`` (N,) at the nodes: the vertices, then for order 2
-    the middles of ``mesh.edges``.
+    one, which gives values (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, and for
+    order 2 then the midpoints of ``mesh.edges``.
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])
@@ -158,9 +158,9 @@ def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Float
 
 @cache
 def rule(corners: int) -> tuple[Floats, Floats]:
-    """Barycentric coordinates (q, k) of the points of a rule for cells of k ``corners``, 2 or 3, and their weights (q,), which sum
-    to 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate Calculation of
-    Multiple Integrals, 2.4).
+    """Barycentric coordinates (q, k) of the points of a quadrature rule for cells with k ``corners``, 2 or 3, and its weights (q,),
+    whose sum is 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate
+    Calculation of Multiple Integrals, 2.4).
     """
     x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2
@@ -173,7 +173,7 @@ def rule(corners: int) -> tuple[Floats, Floats]:
 
 
 def nodes(mesh: FieldMesh, order: int) -> Ints:
-    """The nodes (m, k) of each cell: its corners, then for order 2 the middles of its edges, from each corner to the next."""
+    """The nodes (m, k) of each cell: its corners, and for order 2 then the midpoints of its edges, from each corner to the next."""
     if order == 1:
         return mesh.cells
     middles = mesh.edge_numbers(_all_edges(mesh.cells)).reshape(len(mesh.cells), -1)

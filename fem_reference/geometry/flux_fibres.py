@@ -26,15 +26,15 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # fibres
-_LINES, _LINES_EACH = 1000, 8  # lines that are followed, at least in all and per fibre; the fibres are chosen from them
-_ROUNDS = 50  # of Lloyd's algorithm, which converges in fewer
+_LINES, _LINES_EACH = 1000, 8  # least number of lines in all, and per fibre; the fibres are chosen among these lines
+_ROUNDS = 50  # the most iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A divergence-free flow through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], with a flux of 1 in
-    all from the facets ``start`` (m, 3) to ``end``. ``faces`` (k, 4): the numbers of the triangles opposite the corners of each
+    """A divergence-free flow through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], with a total flux
+    of 1 from the facets ``start`` (m, 3) to ``end``. ``faces`` (k, 4): the indices of the triangles opposite the corners of each
     tetrahedron; ``rises`` (k, 4, 3) [1/mm]: the gradients of its barycentric coordinates.
     """
 
@@ -56,8 +56,8 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     """The flow from the facets ``start`` of a ``mesh`` to ``end``, even over the area of each, and none through the rest of the
     boundary: the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
-    The elements are Crouzeix and Raviart's, whose gradients are those of Raviart and Thomas of lowest order: the flux out of a
-    tetrahedron is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    The elements are Crouzeix and Raviart's; their gradients are lowest-order Raviart-Thomas fields: the flux out of a tetrahedron
+    is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
@@ -79,11 +79,11 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """``count`` lines of 40 points each along a ``flux``, each for the same area of both attachments; InputError where there are
-    fewer.
+    """``count`` lines of 40 points each along a ``flux``, each for the same area of both attachments; InputError if fewer can be
+    traced.
 
-    Many lines start evenly over the area; those kept are the middles of groups that are compact at both ends (Lloyd 1982), in units
-    of the size of each attachment.
+    Many lines start evenly over the area; those kept are the middles of groups that are compact at both ends (Lloyd 1982), measured
+    in units of the size of each attachment.
     """
     if count > MOST:
         raise InputError("fibres.traced.count", count, f'at most {MOST} with flux = "area"')
@@ -97,12 +97,12 @@ def streamlines(flux: Flow, count: int) -> Polylines:
 
 
 def _triangles(mesh: TetMesh) -> Ints:
-    """The corners (4 k, 3) of the triangles of each tetrahedron, each with its corners in order."""
+    """The corners (4 k, 3) of the triangles of each tetrahedron, sorted within each triangle."""
     return np.asarray(np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1))
 
 
 def _numbers(triangles: Ints, facets: Ints) -> Ints:
-    """The number (m,) of each of ``facets`` (m, 3) among different ``triangles`` (n, 3), each with its corners in order."""
+    """The index (m,) of each of ``facets`` (m, 3) among the distinct ``triangles`` (n, 3), whose corners are sorted."""
     _, numbers = np.unique(np.concatenate([triangles, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
     return np.asarray(numbers.ravel()[len(triangles) :])
 
@@ -111,7 +111,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
     """``count`` places (n, 3) [mm], evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
     mesh, facets = flux.mesh, flux.start
     shares = np.cumsum(triangle_areas(mesh.points, facets))
-    facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on the rim of one
+    facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim
     square = (0.5 + np.arange(1, count + 1)[:, None] / _PLASTIC ** np.array([1, 2])) % 1
     beyond = square.sum(axis=1) > 1
     square[beyond] = 1 - square[beyond]  # half of the square is the triangle; the other half is mirrored
@@ -126,7 +126,7 @@ def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
     """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave through the end of the flow, straight in each tet."""
     beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
     passed, arrives, ends = [(going, points)], np.zeros(len(points), bool), _numbers(_triangles(flux.mesh), flux.end)
-    for _ in range(len(flux.mesh.tets)):  # a line passes each once
+    for _ in range(len(flux.mesh.tets)):  # a line passes through each tetrahedron at most once
         local = np.einsum("nia,na->ni", flux.rises[tets], points - flux.mesh.points[flux.mesh.tets[tets, 0]])
         rates = np.einsum("nia,na->ni", flux.rises[tets], flux.slopes[tets])
         local[:, 0] += 1
@@ -158,7 +158,7 @@ def _neighbours(faces: Ints) -> Ints:
 
 
 def _middles(points: Floats, count: int) -> Ints:
-    """The indices of at most ``count`` of ``points`` (n, d): the one next to the middle of each group of Lloyd's algorithm."""
+    """The indices of at most ``count`` of ``points`` (n, d): the one nearest to the middle of each group of Lloyd's algorithm."""
     middles = spread(points, count)
     for _ in range(_ROUNDS):
         _, group = cKDTree(middles).query(points)

@@ -11,13 +11,13 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
 from fem_reference.geometry.distance import farthest_points
 
-# Points inside the surface that give the first centres, and vertices that the fit uses.
+# Numbers of points inside the surface from which the first centres are chosen, and of vertices in the fit.
 _INSIDE, _SAMPLES = 20_000, 1500
-# The distance of samples on both sides of the surface, over the edge of a cube of the same volume.
+# The distance of samples on both sides of the surface, relative to the edge of a cube of the same volume.
 _BESIDE = 0.05
-# Rounds of the fit, each with the slopes of the level at the samples of the round before, and evaluations in each.
+# Rounds of the fit, each with the gradients of the level at the samples from the previous round, and evaluations in each round.
 _ROUNDS, _STEPS = 6, 8
-# The least and the greatest radius, over the edge of a cube of the same volume.
+# The least and the greatest radius, relative to the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
 # The most steps of Newton's method, and its tolerance: the longest step over the least radius.
 _PROJECTIONS, _THERE = 12, 1e-9
@@ -26,7 +26,7 @@ _PROJECTIONS, _THERE = 12, 1e-9
 @dataclass(frozen=True, eq=False)
 class GaussianSurface:
     """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1: ``centres`` (m, 3) and ``radii`` (m,) [mm], four
-    numbers for each Gaussian. A single one is a point; n in one place are a sphere of radius ``r sqrt(log n)``.
+    numbers for each Gaussian. A single one gives a point; n at one centre give a sphere of radius ``r sqrt(log n)``.
     """
 
     centres: Floats
@@ -41,7 +41,7 @@ class GaussianSurface:
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
 
     def project(self, points: Floats, levels: Floats | float = 0.0) -> Floats:
-        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton's method, each step at most the least radius."""
+        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton's method, steps below the least radius."""
         longest = float(self.radii.min())
         for _ in range(_PROJECTIONS):
             level, gradient, _ = self.level(points)
@@ -56,8 +56,8 @@ class GaussianSurface:
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
     """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points on both sides of them, robust against outliers. Deterministic; a turned or scaled surface has a turned or scaled fit up
-    to rounding, where its principal axes are distinct.
+    points on both sides of them, robust against outliers. Deterministic; the fit of a rotated or scaled surface is the rotated or
+    scaled fit, up to rounding, if its principal axes are distinct.
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")
@@ -68,7 +68,7 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
 
 
 def _fit(surface: Surface, count: int) -> GaussianSurface:
-    """The fit to a ``surface`` along its principal axes, of volume 1."""
+    """The fit to a ``surface`` of volume 1 whose principal axes are the coordinate axes."""
     bounds, inside = np.log(_RADII), _inside(surface)
     centres, found = scipy.cluster.vq.kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
     squares = np.bincount(found, ((inside - centres[found]) ** 2).sum(axis=1), count)
@@ -95,13 +95,13 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
 
 
 def _surface(unknowns: Floats) -> GaussianSurface:
-    """Centres, then logarithms of radii."""
+    """The surface of these ``unknowns``: centres, then logarithms of radii."""
     count = len(unknowns) // 4
     return GaussianSurface(unknowns[: 3 * count].reshape(count, 3), np.exp(unknowns[3 * count :]))
 
 
 def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
-    """The slopes (n, 4 m) of the level at ``points`` (n, 3) by the unknowns."""
+    """The derivatives (n, 4 m) of the level at ``points`` (n, 3) with respect to the unknowns."""
     weights = 2 * surface.level(points)[2] / surface.radii**2
     away = points[:, None] - surface.centres
     by_centre = weights[:, :, None] * away
@@ -124,7 +124,7 @@ def _axes(away: Floats) -> Floats:
 
 
 def _inside(surface: Surface) -> Floats:
-    """Nodes (k, 3) of a cubic grid that are inside."""
+    """The nodes (k, 3) of a cubic grid that are inside the ``surface``."""
     step = float(np.cbrt(1 / _INSIDE))
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     ticks = [np.arange(start + step / 2, end, step) for start, end in zip(low, high, strict=True)]

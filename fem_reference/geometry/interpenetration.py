@@ -12,7 +12,7 @@ _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
     """The depth [mm] to which two closed surfaces penetrate each other, and its place (3,): that of the deepest vertex of either in
-    the other, or of the deepest of 28 sample points of a triangle that crosses the other; 0 where they are apart.
+    the other, or of the deepest of the 28 sample points on each triangle that crosses the other; 0 where they are apart.
     """
     pairs = crossings(one, other)
     depths, places = [np.zeros(1)], [one.points[:1]]
@@ -31,5 +31,5 @@ def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
 
 
 def skin_of(mesh: TetMesh) -> Surface:
-    """The boundary of a ``mesh``, with all its points."""
+    """The boundary triangles of a ``mesh``, with all its points."""
     return Surface(mesh.points, boundary(mesh.tets)[0])

@@ -15,9 +15,9 @@ def self_intersections(surface: Surface) -> Ints:
 
 
 def self_crossings(surface: Surface) -> Ints:
-    """Pairs (k, 2) of triangles where an edge of one pierces the other.
+    """Pairs (k, 2) of triangles of which an edge of one pierces the other.
 
-    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap in one plane.
+    Edges that share a vertex with the other triangle do not count, nor do triangles that touch, or overlap in one plane.
     """
     near = near_pairs(surface, surface)
     some = np.arange(len(surface.triangles)) if near is None else np.unique(near)
@@ -36,7 +36,7 @@ def self_crossings(surface: Surface) -> Ints:
 
 
 def crossings(one: Surface, other: Surface) -> Ints:
-    """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly, by predicates of Shewchuk 1997."""
+    """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly by the predicates of Shewchuk 1997."""
     found = near_pairs(one, other)
     near = touching(boxes_of(one), boxes_of(other)) if found is None else tuple(map(np.unique, found.T))
     if not all(map(len, near)):
@@ -51,13 +51,13 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 def overlaps(one: Floats, other: Floats) -> Floats:
     """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
-    either that separates the other from its plane; 0 where either has no area.
+    either that moves the other off its plane; 0 where either has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """Penetration (k,) of ``triangles`` through the planes of ``walls``, on the side with less; NaN without area."""
+    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is less; NaN where a wall has no area."""
     with np.errstate(invalid="ignore", divide="ignore"):
         across = (found := normals(walls)) / np.linalg.norm(found, axis=1)[:, None]
     heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)
@@ -65,7 +65,7 @@ def _reach(triangles: Floats, walls: Floats) -> Floats:
 
 
 def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_]:
-    """Mask (p,) of the ``edges`` (p, 2) that pass through the triangle in the same row of ``triangles`` (p, 3)."""
+    """Mask (p,) of the ``edges`` (p, 2) that pierce the triangle in the same row of ``triangles`` (p, 3)."""
     apart = (edges[:, :, None] != triangles[:, None, :]).all(axis=(1, 2))
     begin, end = (surface.points[edges[apart, side]] for side in range(2))
     a, b, c = (surface.points[triangles[apart, corner]] for corner in range(3))

@@ -1,4 +1,4 @@
-"""Tetrahedra and other arrays that take long to make, stored on disk: written atomically, made anew where damaged."""
+"""A cache on disk for tetrahedra and other arrays that take long to make: written atomically, made anew if damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
     """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are stored in ``folder``, if any, under a hash of all that they depend on, this package and those it imports included.
+    They are stored in ``folder``, if any, under a hash of all that they depend on, including this package and those it imports.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -35,7 +35,7 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
 
 @cache
 def code() -> str:
-    """A hash of all source files here, and of the versions of the packages that make meshes."""
+    """A hash of all source files of this package, and of the versions of the packages that make meshes."""
     folder = Path(__file__).parent
     sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
     return f"{fingerprint(*sources)} {versions(_MADE_WITH)}"
@@ -61,7 +61,7 @@ def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays],
 
 
 def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
-    """The value in a file, None where none can be read completely."""
+    """The value in a file, None if it is missing or cannot be read completely."""
     if not path.is_file():
         return None
     try:
@@ -73,7 +73,7 @@ def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Store arrays, safely for several processes; warn where they cannot be written."""
+    """Store arrays, safely for concurrent processes; warn if they cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as part:

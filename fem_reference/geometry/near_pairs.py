@@ -10,7 +10,7 @@ import platformdirs
 from fem_reference.foundations import native
 from fem_reference.foundations.mesh import Ints, Surface
 
-# No -ffast-math, which changes the order of sums: the bounds of their round-off would not hold.
+# No -ffast-math: it reorders sums, so that the bounds of their round-off would not hold.
 _FLAGS = ("-O3", "-march=native")
 _ROOM = 1000
 
@@ -20,12 +20,12 @@ class _Triangles(ctypes.Structure):
 
     @classmethod
     def of(cls, surface: Surface) -> "_Triangles":
-        """The triangles of a ``surface``, which must outlive them."""
+        """The triangles of a ``surface``, which must outlive them: no copy is made."""
         return cls(len(surface.triangles), surface.points.ctypes.data, surface.triangles.ctypes.data)
 
 
 class _Sorted:
-    """The triangles of a non-empty ``surface``, sorted by their places."""
+    """The triangles of a non-empty ``surface``, sorted into the cells of a grid."""
 
     def __init__(self, surface: Surface, code: ctypes.CDLL) -> None:
         self.code, self.grid = code, code.sorted(_Triangles.of(surface))
@@ -37,14 +37,14 @@ class _Sorted:
             self.code.forget(self.grid)
 
 
-# A bone is asked for at many frames, each time in its own coordinates.
+# Pairs with a bone are sought at many frames, each time in its own coordinates.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Pairs (k, 2) of triangles of two surfaces that may intersect or touch, or of one with itself, each pair
-    once: all that do, and few that do not. Of one surface those that share an edge, or touch at a common corner only, are left
-    out. None without a compiler, or where a point is not finite. Faster where ``other`` is the surface of an earlier call.
+    once: all that do, and few that do not. Triangles of one surface that share an edge, or only touch at a common corner, are left
+    out. None without a compiler, or if a point is not finite. Faster if ``other`` is the surface of an earlier call.
     """
     code = _code()
     if code is None or not all(np.isfinite(surface.points).all() for surface in (one, other)):

@@ -17,8 +17,8 @@ from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
 
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-# The eight parts of a tet with corners 0 to 3 and points 4 to 9 on its edges in the order above, for each of the three diagonals
-# between opposite edges that may cut the octahedron in the middle.
+# The eight parts of a tet with corners 0 to 3 and points 4 to 9 on its edges in the order above, for each of the three diagonals,
+# between points on opposite edges, along which the octahedron in the middle may be cut.
 _CORNERS = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]]
 _DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
 PARTS = np.array(
@@ -30,11 +30,11 @@ PARTS = np.array(
 )
 # A face with corners a, b, c and points on its edges (ab, ac, bc): its four parts.
 _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
-# The position of the cut on an edge at a rim, near which displacement varies with the square root of the distance. Every refinement
-# then divides the error from the rim by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
-# 10.1007/s00211-005-0588-3); in a smooth part quadratic elements do better.
+# The position of the cut on an edge at a rim, near which displacement varies with the square root of the distance. Each refinement
+# then divides the error due to the rim by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
+# 10.1007/s00211-005-0588-3); where the solution is smooth, quadratic elements converge faster.
 GRADED = 0.25
-# A point moves towards the surface while the tets around it keep these shares of their volume and of their quality.
+# A point moves towards the surface as long as the tets around it keep these shares of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
 
@@ -42,11 +42,11 @@ Bools = NDArray[np.bool_]
 
 
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
-    """Tetrahedra each cut into eight, and the facets of regions into four.
+    """The mesh with each tetrahedron cut into eight, and each facet of a region into four.
 
     Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter, all others in the middle. All
     boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far as
-    tetrahedra stay valid; where it is None they stay.
+    tetrahedra stay valid; if ``surface`` is None they stay where they are.
     """
     ends, of_tets, middles = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, middles])
@@ -68,7 +68,7 @@ def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
-    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of it and one that is not."""
+    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and one outside it."""
     found = np.zeros(len(mesh.points), bool)
     for name in rims:
         faces = mesh.facets[name]
@@ -79,7 +79,7 @@ def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
 
 
 def _eighths(points: Floats, nodes: Ints) -> Ints:
-    """The tets (8 k, 4) in tets with ten ``nodes`` (k, 10): the octahedron in the middle is cut along its shortest diagonal."""
+    """The parts (8 k, 4) of tets with ten ``nodes`` (k, 10); the octahedron in the middle is cut along its shortest diagonal."""
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
     tets = np.take_along_axis(nodes, PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
@@ -89,7 +89,7 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
-    """The parts (4 m, 3) of ``faces`` (m, 3), with the same orientation; ``keys`` are those of the edges in order."""
+    """The four parts (4 m, 3) of ``faces`` (m, 3), with the same orientation; ``keys`` are the sorted keys of the edges."""
     if len(faces) == 0:
         return faces
     pairs = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
@@ -98,7 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, those of the boundary moved onto the surface at its volume, as far as the tets around them stay valid."""
+    """The ``points``, those of the boundary moved onto the surface at its volume, as far as the tets around them remain valid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

@@ -1,4 +1,4 @@
-"""Smooth obstacles of paths, ellipsoids and cylinders as quadrics, and tori: levels, gradients, second derivatives."""
+"""Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their two derivatives."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -7,13 +7,13 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 
-# A point this near to the middle of an obstacle, as a share of its size, leaves it in an arbitrary direction.
+# A point this close to the middle of an obstacle, as a share of its size, is pushed out in an arbitrary direction.
 _MIDDLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and the unit vectors (n, 3) along the paths there."""
+    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along the paths there."""
 
     obstacles: Ints
     met: Floats
@@ -39,7 +39,7 @@ class Quadric:
         return float(finite.min() ** 2 / finite.max())
 
     def moved(self, pose: Floats) -> Self:
-        """The surface where a ``pose`` (4, 4) takes it."""
+        """The surface moved by a ``pose`` (4, 4)."""
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
@@ -53,7 +53,7 @@ class Quadric:
         return np.asarray(2 * np.vecdot(own, own))
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside away from the axis first."""
+        """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside first off the axis."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -66,7 +66,7 @@ class Quadric:
         return np.asarray(moved)
 
     def deepest(self, begins: Floats, ends: Floats) -> Floats:
-        """The shares of the lengths of segments from ``begins`` to ``ends`` (..., 3) at which the level is least."""
+        """The positions on segments from ``begins`` to ``ends`` (..., 3), as shares of the length, at which the level is least."""
         one, other = self._own(begins) / self.radii, self._own(ends) / self.radii
         along = other - one
         return np.asarray(np.clip(-np.vecdot(one, along) / np.maximum(np.vecdot(along, along), 1e-300), 0, 1))
@@ -92,11 +92,11 @@ class Ring:
         return self.tube
 
     def moved(self, pose: Floats) -> Self:
-        """The surface where a ``pose`` (4, 4) takes it."""
+        """The surface moved by a ``pose`` (4, 4)."""
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) of the squared distance from the circle less that of the surface, and gradients (n, 3)."""
+        """Values (n,) of the squared distance from the circle, less the squared radius of the tube, and gradients (n, 3)."""
         across = points - self._nearest(points)
         return np.vecdot(across, across) - self.tube**2, 2 * across
 
@@ -117,7 +117,7 @@ class Ring:
         return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
-        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the middles of those that do not."""
+        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of those that do not."""
         axis, centre = self.pose[:3, 2], self.pose[:3, 3]
         low, high = (starts - centre) @ axis, (ends - centre) @ axis
         crosses = low * high < 0
@@ -128,7 +128,7 @@ class Ring:
         return np.where(crosses[:, None], inner, point)
 
     def _outward(self, points: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) and distances (n,) from the axis; from a point on it along the first axis of the pose."""
+        """Unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis along the first axis of the pose."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
         away = np.linalg.norm(flat, axis=1)
@@ -141,5 +141,5 @@ class Ring:
         return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])
 
 
-# A smooth surface on which its level is 0; inside it is negative.
+# A smooth surface: its level is 0 on it and negative inside.
 SmoothSurface = Quadric | Ring

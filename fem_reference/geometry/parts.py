@@ -15,15 +15,15 @@ from fem_reference.geometry.edges import Edges
 Bools = NDArray[np.bool_]
 
 _ROUNDS = 4  # of collapses, flips and slides
-_SHORT = 0.4  # Length of an edge at a rim below which it is collapsed, in sizes of a triangle.
-_STRAIGHT = np.cos(np.radians(50))  # A rim with a greater angle at a point has a corner there.
+_SHORT = 0.4  # Edges at a rim shorter than this are collapsed; in sizes of a triangle.
+_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than this at a point has a corner there.
 _SAME_SIDE = 0.5  # The least cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Triangles in parts: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,) marks points where parts meet."""
+    """Triangles in parts: ``labels`` (m,) are 0 if free, i + 1 in attachment i; ``rim`` (n,) masks the points where parts meet."""
 
     points: Floats
     triangles: Ints
@@ -32,7 +32,7 @@ class Parts:
 
     @property
     def surface(self) -> Surface:
-        """All parts together."""
+        """The surface that all parts form."""
         return Surface(self.points, self.triangles)
 
     def area(self, label: int) -> float:
@@ -49,7 +49,7 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """The parts with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; points of a rim stay on the rim."""
+    """The parts remeshed with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; rim points stay on the rim."""
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
         triangles = flip_edges(parts.points, parts.triangles, parts.labels)
@@ -67,7 +67,7 @@ def _rim_edges(parts: Parts) -> Ints:
 
 
 def _along_rims(parts: Parts) -> Floats:
-    """Points (n, 3) where those on a rim moved along it towards the middle between their neighbours; corners and ends stay."""
+    """Points (n, 3), those on a rim moved along it towards the middle between their neighbours; corners and ends stay."""
     edges = _rim_edges(parts)
     count = len(parts.points)
     both = np.concatenate([edges, edges[:, ::-1]])
@@ -86,7 +86,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 
 def collapsed(parts: Parts, short: float) -> Parts:
-    """The parts without the edges below ``short`` [mm] that end on a rim, where the surface and the rims keep their shape."""
+    """The parts after the collapse of edges below ``short`` [mm] that end on a rim, where surface and rims keep their shape."""
     ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]
@@ -112,7 +112,7 @@ def collapsed(parts: Parts, short: float) -> Parts:
 
 
 def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> bool:
-    """True where ``goes`` has two ``neighbours`` on a rim, one of which ``stays``, and the rim hardly turns there."""
+    """True if ``goes`` has two ``neighbours`` on a rim, one of them ``stays``, and the rim hardly turns at ``goes``."""
     if len(neighbours) != 2 or stays not in neighbours:
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
@@ -120,10 +120,10 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True where ``goes`` may move onto ``stays``: surface manifold, edges sharp, no triangle turned over or the flattest."""
+    """True if ``goes`` may move onto ``stays``: the surface stays manifold, edges sharp, no triangle flips or is the flattest."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
-    if len(here & there) != 4 or len(here | there) < 6:  # the two ends and two others; more than a tetrahedron
+    if len(here & there) != 4 or len(here | there) < 6:  # two ends and two common neighbours; more than a tetrahedron
         return False
     old = triangles[around[goes]]
     shift = (points[stays] - points[goes])[None]
@@ -140,15 +140,15 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
 
 
 def _flatness(points: Floats, triangles: Ints) -> Floats:
-    """4 sqrt(3) area over the sum of the squared sides of each triangle, (m,): 1 for an equilateral one, 0 for a flat one."""
+    """4 sqrt(3) area over the sum of the squared sides of each triangle, (m,): 1 if equilateral, 0 if degenerate."""
     squares = np.sum((points[triangles] - points[np.roll(triangles, 1, axis=1)]) ** 2, axis=(1, 2))
     return np.asarray(4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(squares, _TINY))
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3];
-    before, they are too small, as a polygon inscribed in a circle is. In each round the rim of each part moves outwards by one
-    distance, at most ``most`` [mm], and all points along their normals.
+    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]:
+    both are too small before, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards by the
+    same distance, at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)
@@ -161,7 +161,7 @@ def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Flo
 
 
 def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
-    """Unit vectors (n, 3) out of the part with this label, in its plane, 0 off its rim; the length of the rim [mm]."""
+    """Unit vectors (n, 3) out of the part with this label and tangential to it, 0 off its rim; and the length of the rim [mm]."""
     triangles = parts.triangles[parts.labels == label]
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     corners = parts.points[triangles]

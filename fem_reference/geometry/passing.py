@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, normals
 
 _SHARES = np.arange(4) / 3
-# From the values of a cubic at these shares to its coefficients, and to those of Bernstein, which bound it.
+# Maps from the values of a cubic at these shares to its coefficients, and to its Bernstein coefficients, which bound it.
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))
 _BERNSTEIN = np.linalg.inv(
     np.stack([(1, 3, 3, 1)[i] * _SHARES**i * (1 - _SHARES) ** (3 - i) for i in range(4)], axis=1)
@@ -17,8 +17,8 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
     """Mask (n,) of points that move straight from ``starts`` to ``ends`` (n, 3) and pass through the triangle in the same row,
     whose corners move straight from ``before`` to ``after`` (n, 3, 3), from its front to its back.
 
-    The volume between a point and a triangle is a cubic of the share of the path (Provot 1997, Collision and self-collision
-    handling in cloth model dedicated to design garments); where it falls to 0 the point is in the plane.
+    The volume of the tetrahedron between point and triangle is a cubic in the share of the path (Provot 1997, Collision and
+    self-collision handling in cloth model dedicated to design garments); where it falls to 0 the point is in the plane.
     """
 
     def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:
@@ -35,12 +35,12 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
 
 
 def _volume(points: Floats, triangles: Floats) -> Floats:
-    """Six times the volumes (n,) between points (n, 3) and triangles (n, 3, 3), positive in front."""
+    """Six times the volumes (n,) of the tetrahedra between points (n, 3) and triangles (n, 3, 3), positive in front of these."""
     return np.asarray(np.einsum("ni,ni->n", points - triangles[:, 0], normals(triangles)))
 
 
 def _is_inside(point: Floats, triangle: Floats) -> bool:
-    """True where a ``point`` (1, 3) of the plane of a ``triangle`` (1, 3, 3) is in it."""
+    """True if a ``point`` (1, 3) in the plane of a ``triangle`` (1, 3, 3) is in the triangle."""
     across = normals(triangle)[0]
     arms = triangle[0] - point
     return bool((np.cross(arms, np.roll(arms, -1, axis=0)) @ across >= 0).all())
@@ -48,7 +48,7 @@ def _is_inside(point: Floats, triangle: Floats) -> bool:
 
 def seen_along(points: Floats, directions: Floats, triangles: Floats) -> Floats:
     """The distance (n,) [mm] from ``points`` (n, 3) along unit vectors ``directions`` (n, 3) to the first of the ``triangles``
-    (t, 3, 3) whose back is towards them, infinite where there is none (Moeller and Trumbore 1997).
+    (t, 3, 3) whose back is towards them, infinite if there is none (Moeller and Trumbore 1997).
     """
     first, one, other = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     out, found = np.cross(one, other), np.full(len(points), np.inf)

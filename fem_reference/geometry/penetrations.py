@@ -1,4 +1,4 @@
-"""Penetration of a closed body and a bone: its depth, and the volume of the body within the bone, by random sampling."""
+"""Penetration of a closed body and a bone: its depth, and the overlap volume by random sampling."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,20 +18,20 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-# Points whose winding numbers take as long as building a tree for them.
+# The number of points whose winding numbers take as long as building a search tree.
 _FEW = 20
-# A factor on a distance, for its rounding.
+# A factor on distances that covers their rounding.
 _MORE = 1 + 1e-9
-# Sample points of a triangle that crosses another surface: those of a grid of quarters, its corners among them.
+# Sample points of a triangle that crosses another surface: a grid that divides its edges into quarters, with its corners.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
 _CORNERS = _GRID.argmax(axis=0)
-# The first cubes are at most this long [mm], and at most the longest extent of the surface over this number.
+# The first cubes have edges of at most this length [mm], and at most the longest extent of the surface over this number.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# In a box of more first cubes, a cubic metre or more, the volume is not computed.
+# The volume is not computed in a box of more first cubes than this (a cubic metre or more).
 _TOO_MANY = 1e6
-# The number of rounds of subdivision, the most cubes after each, and the most points drawn in them.
+# The number of rounds of subdivision, the largest number of cubes after each, and of points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# A triangle is sampled in parts of down to an eighth of its size.
+# A triangle is sampled in parts with edges down to an eighth of its own.
 _PARTINGS = 3
 
 Distance = Callable[[Floats], Floats]
@@ -40,7 +40,7 @@ Distance = Callable[[Floats], Floats]
 @dataclass(frozen=True, eq=False)
 class Depths:
     """Penetration depths (k,) [mm] of some vertices and triangles of a body and then of a bone, and their ``places`` (k, 3) [mm];
-    ``at`` are their numbers (k,), in ascending order. All others are outside. Only triangles that cross the other surface are
+    ``at`` (k,) are their indices, in ascending order. All others are outside. Only triangles that cross the other surface are
     sampled; the deepest sample counts.
     """
 
@@ -63,7 +63,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
 
     Depth in the bone is as exact as its distance field, depth in the body exact.
     """
-    # In the frame of the bone, whose boxes do not change; beside a bone at rest those of the body do not either.
+    # In the frame of the bone, whose boxes stay the same; beside a bone at rest those of the body do too.
     still = np.array_equal(pose, np.eye(4))
     local = body if still else body.moved_to(apply(np.linalg.inv(pose), body.points))
     pairs = crossings(local, bone)
@@ -84,7 +84,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
 
 
 def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
-    """Depths (n,) [mm] of ``points`` (n, 3) in a closed ``body``, 0 outside; fast where they are near triangles that are ``known``.
+    """Depths (n,) [mm] of ``points`` (n, 3) in a closed ``body``, 0 outside; fast for points near the ``known`` triangles.
 
     The sign is that of the angle-weighted normal at the closest point (Baerentzen and Aanaes 2005, doi 10.1109/TVCG.2005.49).
     """
@@ -103,7 +103,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
 
 
 def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) that a closed ``body`` winds round; for few points without a tree of its triangles."""
+    """Mask (n,) of the ``points`` (n, 3) inside a closed ``body``, by winding number; few points need no tree of its triangles."""
     found, some = np.zeros(len(points), bool), _in_box(body, points)
     if len(some) > _FEW:
         found[some] = inside(body, points[some])
@@ -113,7 +113,7 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def _in_box(body: Surface, points: Floats) -> Ints:
-    """The ``points`` (k,) of n within the box around the points of a ``body``."""
+    """The indices (k,) of the ``points`` (n, 3) within the bounding box of a ``body``."""
     low, high = body.points.min(axis=0), body.points.max(axis=0)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
 
@@ -121,9 +121,9 @@ def _in_box(body: Surface, points: Floats) -> Ints:
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Numbers of vertices and then of triangles of a surface, their ``depth`` and places: of the deepest sample of triangles
-    ``crossing`` another surface, and of vertices connected to their inside corners or to the ``tips`` that are ``within``;
-    ``tips`` are of parts without such triangles.
+    """Indices of vertices and then of triangles of a surface, with their ``depth`` and places: the deepest sample of each triangle
+    ``crossing`` another surface, and the vertices connected to inside corners of these or to the ``tips`` that are ``within``;
+    ``tips`` belong to parts without such triangles.
     """
     points, corners = surface.points, surface.triangles[crossing]
     grid = np.einsum("gc,tci->tgi", _GRID, points[corners])
@@ -145,7 +145,7 @@ def _of_surface(
 
 
 def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
-    """Extend the mask ``deep`` (n,) of vertices over the ``triangles`` that are not ``crossing``."""
+    """Extend the mask ``deep`` (n,) of vertices across all connected ``triangles`` that are not ``crossing``."""
     goes_on = np.ones(len(triangles), bool)
     goes_on[crossing] = False
     while deep.any():
@@ -157,7 +157,7 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
-    """A vertex of each part of a surface that has no triangle ``crossing`` another surface; its side is that of the part."""
+    """A vertex of each part of a surface without triangles ``crossing`` another surface: the whole part is on its side."""
     firsts, parts = _parts_of(surface)
     return np.delete(firsts, parts[surface.triangles[crossing, 0]])
 
@@ -169,14 +169,14 @@ def _parts_of(surface: Surface) -> tuple[Ints, Ints]:
 
 @lru_cache(maxsize=8)
 def _parts(triangles: bytes) -> tuple[Ints, Ints]:
-    """The first vertex of each part of a surface of ``triangles``, 64 bit integers, and the number (n,) of the part of each."""
+    """The first vertex of each part of a surface of ``triangles``, 64 bit integers, and the index (n,) of the part of each."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
     parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
     return np.unique(parts, return_index=True)[1], parts
 
 
 class Shared(NamedTuple):
-    """The ``volume`` [mm3] within the rigid body, and the depth [mm] of the ``deepest`` sample there, 0 without."""
+    """The ``volume`` [mm3] within the rigid body, and the depth [mm] of the ``deepest`` sample there, 0 if there is none."""
 
     volume: float
     deepest: float
@@ -185,13 +185,13 @@ class Shared(NamedTuple):
 def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
-    Space is cut into cubes, those that may contain a part of the overlap into smaller ones, and 4000 to 8000 random points are
-    drawn in these, the same every time. The expected volume is exact. Its standard deviation is at most half the volume of one
+    Space is cut into cubes, those that may contain a part of the overlap into smaller ones, in which 4000 to 8000 random points
+    are drawn, the same every time. The estimate is unbiased. Its standard deviation is at most half the volume of one
     point, times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
     [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
-    [mm] on all its sides: where all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
+    [mm] on all its sides: if all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
     enters the body and the middle of the body is outside the surface. It is NaN where the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
@@ -218,14 +218,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
 
 def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
-    """Mask of the points (k, 3) of a body that are inside; none where their middle is not in the surface's box."""
+    """Mask (k,) of the points (k, 3) of a ``body`` that are inside; all False if their mean is outside the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
     return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True where a counted triangle enters the body; tested at its vertices, and near the body at those of smaller parts."""
+    """True if a counted triangle enters the body; tested at vertices, and near the body at those of smaller parts of triangles."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
@@ -237,7 +237,7 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance
 
 
 class _Sides:
-    """The counted and the other triangles of a surface, for distance queries."""
+    """The counted triangles and the other triangles of a surface, for distance queries."""
 
     def __init__(self, surface: Surface, counts: NDArray[np.bool_]) -> None:
         self.surface = surface

@@ -9,11 +9,11 @@ from skfem.quadrature import get_quadrature
 
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, TetMesh, corner_areas, tet_volumes
 
-# The corners of a tet between which its last six nodes are.
+# The pairs of corners of a tet between which its last six nodes lie.
 EDGES = np.array([[0, 1], [0, 2], [1, 2], [0, 3], [1, 3], [2, 3]])
 _MIDDLE = np.zeros((4, 4), np.int64)
 _MIDDLE[EDGES[:, 0], EDGES[:, 1]] = _MIDDLE[EDGES[:, 1], EDGES[:, 0]] = np.arange(4, 10)
-# The ten nodes' shares of the integral of a quadratic function over a straight tet, and the six nodes' over a straight triangle.
+# The weights of the ten nodes in the mean of a quadratic function over a straight tet, and of the six nodes over a triangle.
 _BULK = np.repeat([-1 / 20, 1 / 5], [4, 6])
 _FLAT = np.repeat([0, 1 / 3], 3)
 
@@ -47,7 +47,7 @@ class Displaced:
         return float(sizes.sum()), np.asarray(sizes @ means)
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None where unknown."""
+        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
         if self.by is None:
             return None
         tets, local = self._facets(on)
@@ -80,7 +80,7 @@ class Displaced:
 
 
 def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Floats, Floats]:
-    """Basis functions (q, n) and their slopes (d, q, n) at the points of a rule that is exact to degree 4, and its weights (q,)."""
+    """Basis functions (q, n) and their gradients (d, q, n) at the points of a rule exact to degree 4, and its weights (q,)."""
     points, weights = get_quadrature(element, 4)
     nodes = range(6) if element.dim == 2 else (0, 1, 2, 3, 4, 6, 5, 7, 8, 9)  # scikit-fem has edge 12 before edge 02
     values, slopes = zip(*(element.lbasis(points, i) for i in nodes), strict=True)
@@ -88,5 +88,5 @@ def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Flo
 
 
 def quadratic(nodal: Floats) -> Floats:
-    """Values (k, 10, c) at the ten nodes of tets, from ``nodal`` ones (k, 10, c) or, where these are linear, (k, 4, c)."""
+    """Values (k, 10, c) at the ten nodes of tets, from ``nodal`` values (k, 10, c) or, if linear, corner values (k, 4, c)."""
     return nodal if nodal.shape[1] == 10 else np.concatenate([nodal, nodal[:, EDGES].mean(axis=2)], axis=1)

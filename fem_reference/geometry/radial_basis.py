@@ -12,9 +12,9 @@ from fem_reference.foundations.mesh import Floats
 
 @dataclass(frozen=True, eq=False)
 class RadialSum:
-    """``sum_i weights_i exp(-(shape |x - centres_i|)^2)`` plus a polynomial of degree 0 or 1, if any (3.6, 3.7, 3.10).
+    """``sum_i weights_i exp(-(shape |x - centres_i|)^2)`` plus an optional polynomial of degree 0 or 1 (3.6, 3.7, 3.10).
 
-    ``centres`` (m, d), ``weights`` (m,), ``polynomial`` (0,), (1,) or (d + 1,); ``shape``: one over a length; ``condition``: the
+    ``centres`` (m, d), ``weights`` (m,), ``polynomial`` (0,), (1,) or (d + 1,); ``shape``: an inverse length; ``condition``: the
     condition number of the matrix that gave the weights.
     """
 
@@ -31,13 +31,13 @@ class RadialSum:
 
 
 def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
-    """The sum with these ``centres`` (m, d) whose ``values`` (n,) at ``points`` (n, d) are nearest in the mean square; as many
-    centres as points interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
+    """The least-squares fit with these ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d); as many centres as points
+    interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
         raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
     basis = np.hstack([_gaussians(points, centres, shape), _monomials(points, terms)])
-    # The weights are orthogonal to the polynomials: they are sought in the null space of the polynomials at the centres.
+    # The weights are orthogonal to the polynomials: they lie in the null space of the polynomials at the centres.
     flat = np.linalg.qr(_monomials(centres, terms), mode="complete").Q[:, terms:]
     free = np.hstack([basis[:, : len(centres)] @ flat, basis[:, len(centres) :]])
     found, _, _, singular = np.linalg.lstsq(free, values, rcond=None)
@@ -65,7 +65,7 @@ def grid_centres(points: Floats, count: int) -> Floats:
 
 def halton(count: int, dimensions: int) -> Floats:
     """The first ``count`` points (count, d) of Halton's sequence, whose bases are the first primes, in the open unit cube (3.8)."""
-    from scipy.stats import qmc  # half a second
+    from scipy.stats import qmc  # the import takes half a second
 
     return np.asarray(qmc.Halton(dimensions, scramble=False).fast_forward(1).random(count))
 
@@ -77,7 +77,7 @@ def halton_centres(points: Floats, count: int) -> Floats:
 
 
 def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, terms: int = 0) -> Floats:
-    """``count`` of the ``points`` (n, d), each where the sum with those before deviates most from ``values`` (n,)."""
+    """``count`` of the ``points`` (n, d), each where the sum with the previous centres deviates most from ``values`` (n,)."""
     chosen = list(np.argsort(-np.abs(values - values.mean()), kind="stable")[: terms + 1])
     while len(chosen) < count:
         off = np.abs(values - radial_sum(points, values, points[chosen], shape, terms=terms)(points))

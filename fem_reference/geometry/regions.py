@@ -10,25 +10,25 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import FibreField
 from fem_reference.geometry.signed_distance import signed_distances
 
-# Functions of points (n, 3) [mm] at rest: their shares (n,), from 0 to 1, and their depths (n,) [mm] below a border. Picklable.
+# Functions of points (n, 3) [mm] at rest that give shares (n,), from 0 to 1, or depths (n,) [mm] below a border. Picklable.
 Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
 # The ratio of the slopes of the share at the depth of the width and at the border.
 _RISE = 1000.0
-# Points at the border of a cell are moved by this share of the path to its middle, so that they are in the regions of the cell.
+# Points on the border of a cell are moved by this share of the way to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
-# The number of sample points of a body, about, independent of its size.
+# The approximate number of sample points in a body, whatever its size.
 _SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Blended:
-    """The region of depth above 0: by ``(1000^t - 1) / 999``, t from 0 to 1, from a share of 0 at the border to 1 at a depth of
+    """The region of depth above 0: its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at a depth of
     ``width`` [mm].
 
     In a region a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the width, and
-    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. So the
-    stiffer of two materials should be the region, the softer the rest. In series, a part of 0.14 of the width counts as soft.
+    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. The
+    stiffer of two materials should therefore be the region. In series, 0.14 of the width counts as soft.
     """
 
     depth: Depth
@@ -45,7 +45,7 @@ class Blended:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """All of several ``regions``: ``1 - (1 - a) (1 - b) ...``."""
+    """The union of several ``regions`` of shares a, b, ...: ``1 - (1 - a) (1 - b) ...``."""
 
     regions: tuple[Region, ...]
 
@@ -79,8 +79,8 @@ class Around:
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """The part of a body where a Laplace ``field`` between two attachments is from ``first`` to ``last``; 0 and 1 mean up
-    to an attachment. A difference of the field over its mean slope is a depth.
+    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; 0 and 1 mean up
+    to an attachment. The depth is the difference of the field from these divided by its mean slope.
     """
 
     field: FibreField
@@ -98,7 +98,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """Points (n, 3) [mm] inside a closed ``surface``, about 20,000 of a regular grid, each for the same volume."""
+    """About 20,000 points (n, 3) [mm] of a regular grid inside a closed ``surface``, which all represent the same volume."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

@@ -1,8 +1,8 @@
-"""Signed distance to bones of closed form, and the protocol of all obstacles.
+"""Signed distance to bones of closed form, and the protocol that all obstacles follow.
 
-Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors away from the nearest part of the
-surface, curvatures the second derivatives. On ridges, where two parts are equally near, one of them is taken; an infinite
-curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
+Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors out of the body, along the normal at
+the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near, one of them is
+taken; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body with a signed distance, which changes by at most ``steepest`` times the length of a path."""
+    """A rigid body with a signed distance, which along a path changes by at most ``steepest`` times the length of the path."""
 
     @property
     def steepest(self) -> float:
@@ -35,10 +35,10 @@ class Obstacle(Protocol):
 
     @property
     def half_thickness(self) -> float:
-        """The depth [mm] of its deepest place."""
+        """The greatest depth [mm] inside the body."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm] of the path from points (n, 3) to where the distance is at most ``within`` [mm]."""
+        """A lower bound (n,) [mm] of the length of paths from points (n, 3) to where the distance is at most ``within`` [mm]."""
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
@@ -154,7 +154,7 @@ class Box(Exact):
         return min(self.size) / 2
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to a box smaller by the rounding on each side, minus the rounding."""
+        """The distance to a box that is smaller by the rounding on each side, minus the rounding."""
         away = points - self.centre
         sign = np.where(away < 0, -1.0, 1.0)
         beyond = np.abs(away) - (np.asarray(self.size) / 2 - self.rounding)
@@ -173,7 +173,7 @@ class Cylinder(_Rod):
         return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to a rectangle, in the half-plane of the distances from the axis and from the middle."""
+        """The distance to a rectangle in the half-plane whose coordinates are the distances from the axis and from the middle."""
         axis, extent = _axis(self.start, self.end)
         away = points - (np.asarray(self.start, float) + self.end) / 2
         along = away @ axis
@@ -187,7 +187,7 @@ class Cylinder(_Rod):
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
 
 
-# By their names in case files.
+# The bodies by their names in case files.
 CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
     "half_space": HalfSpace,
     "box": Box,
@@ -209,7 +209,7 @@ def _orthant(beyond: Floats) -> Sampled:
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for a zero), and their squares (n, d, d)."""
+    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for zero), and outer products (n, d, d) of these."""
     length = np.linalg.norm(vectors, axis=1)
     some = np.eye(vectors.shape[1])[-1]
     unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])
@@ -217,7 +217,7 @@ def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _over(tensors: Floats, length: Floats) -> Floats:
-    """``tensors`` (n, d, d) divided by ``length`` (n,), zero where that is zero."""
+    """``tensors`` (n, d, d) divided by ``length`` (n,), zero where the length is zero."""
     return np.asarray(tensors * np.divide(1, length, out=np.zeros_like(length), where=length != 0)[:, None, None])
 
 

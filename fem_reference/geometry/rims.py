@@ -16,19 +16,19 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 Bools = NDArray[np.bool_]
 
-# Chosen on the report's muscles and our own hip. Smoothing length of the shares, in sizes of a triangle; longer, it rounds corners.
+# Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1
-# A vertex nearer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers stay.
+# A vertex closer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers remain.
 _NEAR = 0.3
-# A fixed vertex nearer than this counts as on the rim.
+# A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
 _THERE = 0.2
-# An edge over a piece of an attachment, or over a gap in it, is cut where that is wider than this share of the edge.
+# An edge across a piece of an attachment, or across a gap in it, is cut if the piece or gap is wider than this share of the edge.
 _NARROW = 0.3
 _REFINED = 2  # rounds of search for narrow pieces and gaps
-_ISLAND = 0.1  # squares of the size: the least area of an island of an attachment that is kept
-_WIDENED = 0.1  # sizes of a triangle: the most that a rim moves outwards in each of a few rounds
-_SAMPLES = 17  # of the shares along an edge
-_TRIALS = 10  # of the level, to match the area
+_ISLAND = 0.1  # the least area of an island of an attachment that is kept, in squares of the size
+_WIDENED = 0.1  # the most that a rim moves outwards in each round, in sizes of a triangle
+_SAMPLES = 17  # number of samples of the shares along an edge
+_TRIALS = 10  # number of trials of the level, to match the area
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
@@ -36,8 +36,8 @@ def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size
     triangles: 0 free, i + 1 attached by attachment i. Attachments are defined on the ``fine`` surface, by the attached ``shares``
     (k, 3) of the corners of its triangles.
 
-    The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level of them that
-    encloses their original area. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
+    The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level line that
+    encloses the original area. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
     doi 10.1145/1276377.1276448, for surfaces).
     """
     free = np.zeros(len(coarse.triangles), np.int64)
@@ -77,7 +77,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """The parts with a new point in the middle of each island of an attachment of ``least`` [mm2] or more without a point."""
+    """The parts with a new point in the middle of each island of an attachment that has ``least`` [mm2] or more but no point."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
@@ -99,7 +99,7 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
-    """The number (m, 3) of each corner's connected island of shares above a half, -1 outside all."""
+    """The index (m, 3) of the connected island of shares above a half in which each corner lies, -1 outside all islands."""
     attached = np.zeros(len(fine.points), bool)
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -109,7 +109,7 @@ def _islands(fine: Surface, shares: Floats) -> Ints:
 
 
 def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
-    """The parts with the rim at the level with the area nearest to ``area`` [mm2], by bisection."""
+    """The parts with the rim at the level whose area is closest to ``area`` [mm2], by bisection."""
     for _ in range(_REFINED):
         parts = _refined(parts, fine, _Edges.of(parts, fine, shares))
     edges = _Edges.of(parts, fine, shares)
@@ -125,7 +125,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts with edges cut that are on the other side of the level 1/2 for much of their length, but not at their ends."""
+    """The parts after cutting edges that are beyond the level 1/2 along much of their length, but not at their ends."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]
@@ -186,7 +186,7 @@ class _Crossings:
 
 
 def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
-    """The parts with triangles cut along the crossings; formerly free ones inside get the ``label``."""
+    """The parts with triangles cut along the crossings; free triangles inside get the ``label``."""
     points, signs = _snapped(parts, fine, crossings)
     ends = crossings.edges.ends
     split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
@@ -202,7 +202,7 @@ def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Part
 
 
 def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats, Ints]:
-    """Points (n, 3), moved to near crossings unless they would leave a sharp edge or another rim; signs (n,), 0 on the rim."""
+    """Points (n, 3), moved to nearby crossings unless they would leave a sharp edge or another rim; signs (n,), 0 on the rim."""
     across = ~np.isnan(crossings.fractions[:, 0])
     ends, fractions = crossings.edges.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])
@@ -224,7 +224,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Points and triangles, ``chosen`` edges (k,) cut at ``middles`` (k, 3) moved to ``fine``, and each one's original triangle."""
+    """Points and triangles, ``chosen`` edges (k,) cut at ``middles`` (k, 3) moved to ``fine``, and the original triangle of each."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])
@@ -232,7 +232,7 @@ def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Fl
 
 
 def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
-    """Triangles cut at the points ``cuts`` (m, 3) opposite to their corners, -1 for none; and the original triangle of each."""
+    """Triangles cut at the points ``cuts`` (m, 3) opposite to their corners, -1 for none; and the index of the original of each."""
     count = (cuts >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
     one = np.flatnonzero(count == 1)

@@ -5,12 +5,12 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, twins, unit_normals
 from fem_reference.geometry.distance import distances
 
-# Two triangles meet in a sharp edge where the angle between their normals is greater.
+# Two triangles meet in a sharp edge if the angle between their normals is greater than this.
 _SHARP = np.cos(np.radians(45))
 
 
 def sectors(surface: Surface) -> Ints:
-    """The number (m, 3) of the sector of each corner of a triangle: around a vertex, from sharp edge to sharp edge."""
+    """The index (m, 3) of the sector of each corner of the triangles: a part around a vertex, from sharp edge to sharp edge."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
     one, other = twins(triangles).T
@@ -21,8 +21,8 @@ def sectors(surface: Surface) -> Ints:
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
     """The attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for attached ``vertices`` (k,).
 
-    A vertex on a sharp edge attaches only the sides of the edge with a whole attached triangle at the vertex, if there is one: the
-    end of a muscle, but not a strip of arbitrary width of the belly around it.
+    A vertex on a sharp edge attaches only those sides of the edge on which a triangle at the vertex is wholly attached, if any: the
+    end of a muscle, but not a strip of arbitrary width of the belly next to it.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True
@@ -42,6 +42,6 @@ def attached_area(surface: Surface, shares: Floats) -> float:
 
 
 def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
-    """The attached shares (n,) at the nearest points of a ``surface`` to ``points`` (n, 3) [mm], by corner ``shares`` (m, 3)."""
+    """The attached shares (n,) at the points of a ``surface`` nearest to ``points`` (n, 3) [mm], from corner ``shares`` (m, 3)."""
     nearest = distances(points, surface)
     return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))

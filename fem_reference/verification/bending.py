@@ -1,4 +1,4 @@
-"""Bodies that are bent and twisted: a block into a sector of a tube, a cylinder by a finite angle, a square bar by a small one."""
+"""Bodies that are bent and twisted: a block into a tube sector, a cylinder by a finite angle, a square bar by a small one."""
 
 from collections.abc import Callable
 from functools import partial
@@ -16,12 +16,12 @@ from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SLOW, clamped, control, find, mooney_rivlin, neo_hooke, sliding
 
 rivlin = find("rivlin")
-# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The truths are of incompressible material.
+# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The true values are those of an incompressible material.
 MU, BULK = 0.01, 1e4
 C1, C2 = 0.003, 0.002
-# The bent block [mm], and the angle [rad] between its ends: the faces are at 15.7 and 25.4 mm.
+# The bent block [mm], and the angle [rad] between its ends: bent, its curved faces have radii of 15.7 and 25.4 mm.
 THICKNESS, LENGTH, WIDTH, ANGLE = 10.0, 20.0, 2.5, 1.0
-# Radius and height of the cylinder [mm], and its twist [rad/mm]: 0.5 rad from end to end, a shear of 0.5 at its side.
+# Radius and height of the cylinder [mm], and its twist [rad/mm]: 0.5 rad from end to end, a shear of 0.5 at its lateral surface.
 RADIUS, TALL, TWIST = 10.0, 10.0, 0.05
 # Side and length of the square bar [mm], and its twist [rad/mm]: a shear of 0.0007 at its edges.
 SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
@@ -107,10 +107,10 @@ def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> f
     return float(4 * lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["z1"][2] / SMALL_TWIST)
 
 
-CELLS = {"P2/P1": ("tetrahedra", (1, 2, 4)), "Q2/Q1": ("hexahedra", (1, 2, 3))}  # by element, with counts of them
+CELLS = {"P2/P1": ("tetrahedra", (1, 2, 4)), "Q2/Q1": ("hexahedra", (1, 2, 3))}  # by element: cells and their numbers
 FREE = control("one lateral face is free, so that the block may change its width", faces=("z0",))
 STIFF = control("the shear modulus is 1 % too large", mu=1.01 * MU)
-MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="the error changes its sign between meshes: no order")
+MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="no order: the error changes its sign between meshes")
 
 
 def flexure(
@@ -122,14 +122,14 @@ def flexure(
     return Entry(
         name=f"flexure_{name}",
         group="flexure",
-        title=f"Bending a block, half as thick as long, by one radian: {READINGS[reading].words}, by {cells} ({element})",
+        title=f"A block, half as thick as it is long, bent by one radian: {READINGS[reading].words}, by {cells} ({element})",
         unit=READINGS[reading].unit,
         measure=bent,
         given={"reading": reading, "element": element},
         truth=READINGS[reading].truth,
         within=error[0],
         relative=True,
-        because=f"discretisation {error[1]} cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
+        because=f"discretisation error {error[1]} cells through the thickness; K/mu = 1e6 instead of incompressibility adds 1e-6",
         kind="closed form",
         source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
         **stated,
@@ -142,9 +142,9 @@ TWISTED = {
     "Mooney-Rivlin": (MOONEY_RIVLIN, rivlin.Torsion(C1, C2, RADIUS, TWIST)),
 }
 MOMENT = ("moments", "the moment", "N mm", "moment")
-PULL = ("forces", "the force that keeps it from growing longer (Poynting effect)", "N", "axial_force")
-STRAIGHT = control("straight cells, whose surface has flat facets", degree=1)
-SAME_MOMENT = "material of the same shear modulus, which turns with the same moment"
+PULL = ("forces", "the axial force that keeps its length (Poynting effect)", "N", "axial_force")
+STRAIGHT = control("straight cells, with flat facets on the surface", degree=1)
+SAME_MOMENT = "material of the same shear modulus, which needs the same moment"
 MOONEY = control(f"Mooney-Rivlin {SAME_MOMENT}", material=MOONEY_RIVLIN)
 NEO = control(f"neo-Hookean {SAME_MOMENT}", material=NEO_HOOKE)
 OTHER_C2 = control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, BULK))
@@ -153,7 +153,7 @@ OTHER_C2 = control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, 
 def torsion(
     name: str, law: str, read: tuple[str, ...], wrong: dict[str, Any], error: tuple[float, str], **given: Any
 ) -> Entry:
-    """A quantity ``read`` of the twisted cylinder, on a ladder of cells unless the number of ``rings`` is given."""
+    """A quantity ``read`` of the twisted cylinder, on several meshes unless the number of ``rings`` is given."""
     end, words, unit, truth = read
     material, true = TWISTED[law]
     cells, counts = CELLS[given["element"]]
@@ -161,14 +161,14 @@ def torsion(
     return Entry(
         name=f"torsion_{name}",
         group="torsion",
-        title=f"Twisting a {law} cylinder by half a radian: {words}, by curved {cells} ({given['element']})",
+        title=f"A {law} cylinder twisted by half a radian: {words}, by curved {cells} ({given['element']})",
         unit=unit,
         measure=twisted,
         given={"end": end, "material": material, **given},
         truth=getattr(true, truth),
         within=error[0],
         relative=True,
-        because=f"discretisation of order 4, {error[1]} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
+        because=f"discretisation error of order 4, {error[1]} cells along the radius; K/mu = 1e6, not incompressible, adds 1e-6",
         kind="closed form",
         source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
         **wrong,
@@ -181,7 +181,7 @@ SQUARE = partial(
     group="torsion",
     unit="N mm2",
     measure=square_bar,
-    **control("the ends are kept plane, as a round bar would keep them", turned=(0, 1, 2)),
+    **control("the ends are kept plane: no warping", turned=(0, 1, 2)),
     truth=lambda: find("torsion").square_bar_stiffness(MU, SIDE),
     relative=True,
     kind="closed form",
@@ -202,10 +202,10 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         SQUARE(
             name=f"torsion_square_bar_{cells}",
-            title=f"Twisting a square bar a little, free to warp: the torsional stiffness, by {cells} ({element})",
+            title=f"A square bar twisted a little, free to warp: its torsional stiffness, by {cells} ({element})",
             given={"element": element, "turned": (0, 1)},
             within=within,
-            because=f"discretisation of order 3.7, {left} with 16 cells across; the finite twist adds 1e-6",
+            because=f"discretisation error of order 3.7, {left} with 16 cells across; the finite twist adds 1e-6",
         )
         for cells, element, within, left in (
             ("tetrahedra", "P2/P1", 1e-4, "1.9e-5"),

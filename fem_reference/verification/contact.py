@@ -1,4 +1,4 @@
-"""Contact of bodies with rigid ones: a plate on a block, and a ball on a large body (Hertz)."""
+"""Contact of deformable with rigid bodies: a plate on a block, and a ball on a large body (Hertz)."""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -16,9 +16,10 @@ from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, neo_hooke
 
 MU = 0.01  # [MPa]
-PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
-RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0  # of the ball [mm], and of the body [MPa]: pressed to a contact of 1 mm
-BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, and its finest part [mm]
+PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm], [mm]; the cube has sides of 1 mm
+# Of the ball [mm], and the bulk modulus of the body [MPa]: the radius of the contact is 1 mm.
+RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0
+BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; radii of the body and of its finely meshed core [mm]
 
 
 def sliding_by(path: float) -> Callable[[float], Floats]:
@@ -58,8 +59,8 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
 
 
 def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
-    """Readings of the force ``name`` on a quarter: that of the whole ball [N], and the radius [mm] of the contact from its lever,
-    as the resultant of Hertz's pressure on a quarter has its lever at 3/8 of it.
+    """Readings of the force ``name`` on a quarter: that on the whole ball [N], and the contact radius [mm] from the lever arm
+    of the force: the resultant of Hertz's pressure on a quarter acts at 3/8 of that radius.
     """
     return {
         "force": lambda state: 4 * float(state.forces[name][2]),
@@ -85,14 +86,14 @@ YOUNG, POISSON = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 
 
 
 def known_ball(name: str) -> float:
-    """The closed form for a rigid ball on a body of the same moduli."""
+    """The closed form for a rigid ball on a body of these moduli."""
     hertz = find("hertz")
     known = hertz.rigid_sphere(RADIUS, YOUNG, POISSON, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH))
     return float(getattr(known, name))
 
 
 CONTACT = partial(Entry, group="contact", relative=True, kind="closed form")
-# By reading of a ball: the end of the entry's name, the end of its title, and the unit.
+# By reading: the end of the entry's name, the end of its title, and the unit.
 _SAID = {
     "force": ("force", "its force", "N"),
     "contact_radius": ("radius", "the radius of the contact", "mm"),
@@ -137,7 +138,7 @@ ENTRIES = (
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
-            because="the state is homogeneous and the plate a spring: only Newton's residual of 1e-12 N remains",
+            because="the state is homogeneous and the plate a spring: only the Newton residual of 1e-12 N remains",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
@@ -147,7 +148,7 @@ ENTRIES = (
         "A rigid ball pressed into a large body: {}",
         ball,
         known_ball,
-        "the mesh leaves 1 to 1.5 %; strains of a tenth, the end of the body and the depth of the ball each add less",
+        "the discretisation error is 1 to 1.5 %; strains of 0.1, the finite size of the body and the penetration each add less",
         READINGS,
     ),
 )

@@ -1,7 +1,7 @@
 """Cook's membrane: a clamped, tapered panel in plane strain, under a shear load; nearly incompressible, bent and sheared at once.
 
-The panel is one layer of cells, both of whose faces stay in their planes. The small strain solution comes from a load so small
-that the answer is linear, and is scaled up.
+The panel is one layer of cells, both of whose faces stay in their planes. The small strain solution is computed under a load so
+small that the response is linear, and is scaled up.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from fem_reference.verification.parts import SLOW, clamped, control, find, neare
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
-SMALL = 1e-5  # the share of the load at which the answer is linear: terms of second order are some 1e-5 of it
-RESIDUAL = 1e-5  # at the whole load [N, mm3], where some 100 N act
-LOCKED = 0.5  # a tip that gets less than this share of its displacement is locked
+SMALL = 1e-5  # the share of the load at which the response is linear: second-order terms are about 1e-5 of it
+RESIDUAL = 1e-5  # at the whole load of about 100 N [N, mm3]
+LOCKED = 0.5  # the panel locks if its tip reaches less than this share of the true displacement
 
 
 def _place(unit: Floats) -> Floats:
-    """Points (n, 3) [mm] of the panel from those of the unit cube, crowded towards its four sides: the clamped corners need it."""
+    """Points (n, 3) [mm] of the panel from those of the unit cube, refined towards its four sides for the clamped corners."""
     x, y = (3 * unit[:, :2] ** 2 - 2 * unit[:, :2] ** 3).T
     weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
     return np.column_stack([weights @ np.array(cook.CORNERS), THICKNESS * unit[:, 2]])
@@ -33,8 +33,8 @@ def _place(unit: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Panel:
-    """The membrane ``name`` of ``validation.cook`` made of an ``element``, under a ``share`` of its load; its moduli are wrong by
-    the factors ``shear`` and ``bulk``.
+    """The membrane ``name`` of ``validation.cook`` made of an ``element``, under a ``share`` of its load; its moduli are
+    multiplied by ``shear`` and ``bulk`` (1: the true values).
     """
 
     name: str
@@ -54,7 +54,7 @@ class Panel:
 
 
 def tip(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement of the corner (48, 60) of a :class:`Panel` along y in n by n cells [mm], over its share of the load."""
+    """The displacement of the corner (48, 60) of a :class:`Panel` along y in n by n cells [mm], divided by its load share."""
     made = Panel(**panel)
     body, first = made.body(n), 0.25 if made.share == 1 else 1.0
     state = lab.solve(body, made.element, first_step=first, residual=RESIDUAL * made.share).last
@@ -63,7 +63,7 @@ def tip(lab: Lab, n: int, **panel: Any) -> float:
 
 
 def ratio(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement of the corner over its true value."""
+    """The displacement of the corner, divided by its true value."""
     return tip(lab, n, **panel) / float(getattr(cook, panel["name"]).tip)
 
 
@@ -76,30 +76,30 @@ MEMBRANES = {
     "FINITE_QUARTER": "at finite strain, a quarter of the load",
     "FINITE": "at finite strain, the whole load",
 }
-# By element: the cells in words, and the counts of them. Towards the singular clamped corners the error of quadratic cells falls at
-# order 1 or more; that of linear ones, which are far from it, at 2.
+# By element: the cells in words, and the numbers of them. The singular clamped corners limit quadratic cells to order 1 or a little
+# more; linear cells, whose error is far larger, converge at order 2.
 CELLS = {
     "P1": ("linear tetrahedra", (16, 32, 64)),
-    "P1/P1": ("linear tetrahedra with a linear pressure that is stabilised", (8, 16, 32)),
+    "P1/P1": ("linear tetrahedra with a stabilised linear pressure", (8, 16, 32)),
     "Q1/P0": ("linear hexahedra with a constant pressure", (8, 16, 32)),
     "P2": ("quadratic tetrahedra", (4, 8, 16)),
     "P2/P1": ("quadratic tetrahedra with a pressure", (4, 8, 16)),
     "Q2/Q1": ("quadratic hexahedra with a linear pressure", (4, 8, 16)),
 }
-SOURCE = "validation/cook.py: finite elements of degree 6 to 10 of our own in numpy, on graded grids; Cook 1974"
+SOURCE = "validation/cook.py: our own finite elements of degree 6 to 10 in numpy, on graded meshes; Cook 1974"
 MEMBRANE = partial(Entry, group="Cook's membrane", kind="second solver", source=SOURCE)
 LINEAR = control("linear tetrahedra without a pressure", element="P1")
 LINEAR_HEXAHEDRA = control("linear hexahedra without a pressure", element="Q1")
 SOFTER = control("Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus", shear=4 / 3 / 1.4, bulk=5 / 3)
 LOCKING = control("Poisson's ratio is 0.4999, at the same Young's modulus: it locks", **NEARLY)
 STIFF = control("the shear modulus is 2 % too high", shear=1.02)
-SMALL_STRAIN = control("small strain, by linear extrapolation of a tiny load", share=SMALL)
+SMALL_STRAIN = control("small strain, linearly extrapolated from a tiny load", share=SMALL)
 
 
 def tip_entry(
     name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
 ) -> Entry:
-    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and the excess of stiffness in words."""
+    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
     words, counts = CELLS[element]
     by, order = ("by linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
@@ -112,13 +112,13 @@ def tip_entry(
         truth=getattr(cook, panel["name"]).tip,
         within=stiff[0],
         relative=True,
-        because=f"discretisation, {by}, too stiff by {stiff[1]}",
+        because=f"discretisation error, {by}: too stiff by {stiff[1]}",
         **stated,
     )
 
 
 SHORT = Refinement((4, 8), HEIGHT, order=1)
-LEFT_OPEN = "0.06 %; a clamped corner folds on fine meshes, so that 0.02 % of the truth are open"
+LEFT_OPEN = "0.06 %; a clamped corner folds on fine meshes, so that the true value is uncertain by 0.02 %"
 
 ENTRIES: tuple[Entry, ...] = (
     tip_entry("compressible", COMPRESSIBLE, "P2", SOFTER, (0.005, "0.15 %")),
@@ -132,26 +132,26 @@ ENTRIES: tuple[Entry, ...] = (
     tip_entry("full_load", FULL, "Q2/Q1", SMALL_STRAIN, (0.002, LEFT_OPEN), slow=True, refinement=SHORT),
     MEMBRANE(
         name="cook_p1_locks",
-        title="Linear tetrahedra lock at Poisson's ratio 0.4999: tip over where it should be, less than a half",
+        title="Linear tetrahedra lock at Poisson's ratio 0.4999: the tip reaches less than half of its true displacement",
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P1"},
         **control("quadratic tetrahedra with a pressure", element="P2/P1"),
         truth=LOCKED / 2,
         within=LOCKED / 2,
-        because="the band is all from 0 to 0.5: less than half of the displacement is called locked; how much less is no truth",
+        because="less than half of the displacement is called locked: any ratio from 0 to 0.5 passes",
         kind="property",
-        source="where the tip should be: " + SOURCE,
+        source="true displacement of the tip: " + SOURCE,
     ),
     MEMBRANE(
         name="cook_taylor_hood",
-        title="On the mesh where linear tetrahedra lock, those of Taylor and Hood do not: tip over where it should be",
+        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones do: tip displacement over its true value",
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},
         **LINEAR,
         truth=1.0,
         within=0.01,
-        because="discretisation: 0.8 % too stiff in 8 by 8 cells",
+        because="discretisation error: too stiff by 0.8 % in 8 by 8 cells",
     ),
 )

@@ -1,4 +1,4 @@
-"""Resistance to motion: drag of the ground and viscosity of the matrix, in a steady motion and in a body that creeps back."""
+"""Resistance to motion: viscous drag and viscosity of the matrix, in a steady motion and in a body that creeps back."""
 
 from functools import partial
 
@@ -15,21 +15,21 @@ from fem_reference.verification.loads import FREE_FALL, MUSCLE, weight
 from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, control, find, frames, neo_hooke, sliding
 
 damping, viscosity = find("damping"), find("viscosity")
-SECONDS = 0.1  # from a frame number to the next, with a drag
-DRAG = 1e-4  # of a block that falls through something viscous [MPa s/mm2]
-# A bar in a smooth box: its length [mm], bulk modulus [MPa] and the rate at which it creeps back [1/s].
+SECONDS = 0.1  # from one frame to the next, with a drag
+DRAG = 1e-4  # of a block that falls through a viscous medium [MPa s/mm2]
+# A bar in a frictionless box: its length [mm], bulk modulus [MPa] and the rate at which it creeps back [1/s].
 LENGTH, SOFT, RATE = 10.0, 5 * MU, 5.0
 CREEP = (SOFT + 4 / 3 * MU) * (np.pi / (2 * LENGTH)) ** 2 / RATE  # [MPa s/mm2]
 LIGHT = 1e-6  # a weight [N/mm3], for a stretch of 1e-4
-ETA, VISCOUS_SECONDS = 0.02, 1.5  # of the viscous blocks [MPa s], and from a frame number to the next [s]
-BULK = 1e6 * MU  # so high that the truth of incompressible material is met to 1e-6
+ETA, VISCOUS_SECONDS = 0.02, 1.5  # viscosity of the blocks [MPa s], and time from one frame to the next [s]
+BULK = 1e6 * MU  # so high that the closed form for incompressible material holds to 1e-6
 STRESS = 3e-4 * MU  # a small weight on the top of a block until frame 1, which then creeps back
 # Loads that are removed by frame 2.
 UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
 
 def velocity(lab: Lab, seconds: float) -> float:
-    """The velocity [mm/s] of a free block with its whole weight, over four frames; ``seconds`` are from a frame to the next."""
+    """The velocity [mm/s] of a free block under its full weight, over four frames that are ``seconds`` apart."""
     mesh = shapes.box((2, 2, 2), (1.0, 2.0, 3.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), weight(MUSCLE), make("damping", coefficient=DRAG))
     solved = lab.solve(Body(mesh, acting, (), (0, 1, 5), interval=seconds), "P2/P1", first_step=0.5, residual=1e-13)
@@ -75,7 +75,7 @@ def block_creep(lab: Lab, n: int, eta: float) -> float:
 
 
 def halved(counts: tuple[int, ...], seconds: float, name: str) -> Refinement:
-    """Load steps of ``seconds / count``, by which implicit Euler finds the quantity ``name``."""
+    """Load steps of ``seconds / count`` for the quantity ``name``, which implicit Euler integrates."""
     note = f"{name} by implicit Euler; sizes are seconds of a load step, the value is extrapolated from the last two"
     return Refinement(counts, seconds, order=1, extrapolated=True, note=note)
 
@@ -93,20 +93,20 @@ VISCOUS = partial(
 ENTRIES: tuple[Entry, ...] = (
     DAMPED(
         name="damped_fall",
-        title="Free block, with a drag and its weight: the speed of its fastest node",
+        title="Free block that sinks under its weight against a drag: the speed of its fastest node",
         unit="mm/s",
         measure=velocity,
         given={"seconds": SECONDS},
-        **control("A time from frame to frame that is 1 % too long.", seconds=1.01 * SECONDS),
+        **control("The time from one frame to the next is 1 % too long.", seconds=1.01 * SECONDS),
         truth=lambda: -damping.terminal_velocity(MUSCLE * FREE_FALL, DRAG),
         within=1e-9,
-        because="Implicit Euler has a steady motion exactly, and so does the element, but for the residual: 1e-13 N are 2e-9 of "
-        "the weight of 6e-5 N in each step, of which only the sum over the nodes moves the block.",
+        because="Implicit Euler and the element represent a steady motion exactly; the residual of 1e-13 N in each step is 2e-9 of "
+        "the weight of 6e-5 N, and only its sum over the nodes moves the block.",
         source="validation/damping.py, terminal_velocity",
     ),
     DAMPED(
         name="damped_creep",
-        title="Bar in a smooth box that creeps back when its weight is gone: rate of the slowest mode, by load steps that are "
+        title="Bar in a frictionless box that creeps back once unloaded: rate of the slowest mode, by load steps that are "
         "halved",
         unit="1/s",
         measure=bar_creep,
@@ -114,30 +114,30 @@ ENTRIES: tuple[Entry, ...] = (
         **control("A drag 1 % too small.", coefficient=0.99 * CREEP),
         truth=lambda: damping.relaxation_rate(MU, SOFT, CREEP, LENGTH),
         within=2e-3,
-        because="Of x = rate times the longer load step, 1/16, implicit Euler without its first order leaves x^2 / 6 = 6.5e-4; the "
-        "next mode, nine times as fast, has died out to 1e-5, and 1e-4 is how far the stretch is from small strain.",
+        because="With x = rate times the longer load step = 1/16, extrapolated implicit Euler errs by x^2 / 6 = 6.5e-4; the next "
+        "mode, nine times as fast, has decayed to 1e-5, and the finite strain of 1e-4 adds about 1e-4.",
         source="validation/damping.py, relaxation_rate",
         refinement=halved((4, 8, 16), SECONDS, "rate"),
     ),
     VISCOUS(
         name="viscous_squeeze",
-        title="Viscous block that smooth plates squeeze to half its height: their force, by load steps that are halved",
+        title="Viscous block squeezed to half its height between smooth plates: their force, by load steps that are halved",
         unit="N",
         measure=force,
         truth=lambda: viscosity.squeeze_force(MU, ETA, 0.5, -0.5 / VISCOUS_SECONDS, 1.0),
-        because="The last load step shortens the block by x of its height then, 1/64 in the longer steps. By hand the potential "
-        "errs by -2 x + 16/3 x^2 of the viscous part, 0.7 of the force; without the first order 0.7 * 8/3 x^2 = 4.6e-4 is left.",
+        because="The last load step shortens the block by the share x of its height, 1/64 with the longer steps. By hand, the "
+        "viscous part (0.7 of the force) errs by -2 x + 16/3 x^2; extrapolation leaves 0.7 * 8/3 x^2 = 4.6e-4.",
         source="validation/viscosity.py, squeeze_force",
         refinement=halved((32, 64, 128), VISCOUS_SECONDS, "force"),
     ),
     VISCOUS(
         name="viscous_creep",
-        title="Viscous block that creeps back when its weight is gone: rate, by load steps that are halved",
+        title="Viscous block that creeps back once unloaded: rate, by load steps that are halved",
         unit="1/s",
         measure=block_creep,
         truth=lambda: viscosity.creep_rate(MU, ETA),
-        because="Of x = rate times the longer load step = 0.047 implicit Euler without its first order leaves x^2 / 6 = 3.7e-4; "
-        "1e-4 is how far the strain is from a small one.",
+        because="With x = rate times the longer load step = 0.047, extrapolated implicit Euler errs by x^2 / 6 = 3.7e-4; the "
+        "finite strain of 1e-4 adds about 1e-4.",
         source="validation/viscosity.py, creep_rate",
         refinement=halved((8, 16, 32), VISCOUS_SECONDS, "rate"),
     ),

@@ -1,7 +1,7 @@
-"""Measured muscles beside the shipped material, which was chosen from other sources and is never fitted to these.
+"""The shipped material compared with measured muscles, to which it is never fitted: it was chosen from other sources.
 
-An entry states whether the value is within the uncertainty of the experiment; outside is a finding, not a failure. Its value is
-pinned, so that a change of a law or of the material is noticed.
+An entry states whether the value lies within the uncertainty of the experiment; a value outside is a finding, not a failure. The
+value is pinned, so that a change of a law or of the material is noticed.
 """
 
 from dataclasses import replace
@@ -16,7 +16,7 @@ EXPERIMENT = partial(Entry, group="experiments", kind="experiment")
 STIFFER = (make("neo_hooke", mu=0.011), *SHIPPED[1:])
 ISOTROPIC = SHIPPED[:2]
 COLLAGEN = with_collagen(0.3, 0.2, 1.5)
-# By name: the value of the shipped material. Numbers of our own: they guard against change and validate nothing.
+# By name: the value that the shipped material gives here. These pins guard against unintended change and validate nothing.
 PINNED = {
     "cube_poisson_along": 0.4995238,
     "cube_poisson_fibre": 0.1466180,
@@ -87,8 +87,8 @@ ORDERS = Quantity(
     facts=(),
     truth=1.0,
     within=0.5,
-    because="An order: 1 where both are met by 1 % and more, 0 where not.",
-    limit="A law of fibres that pull in tension only meets neither.",
+    because="The answer is yes (1: both differences are at least 1 %) or no (0).",
+    limit="A law of fibres that pull in tension only reproduces neither.",
     is_order=True,
 )
 

@@ -1,4 +1,4 @@
-"""Blocks of muscle whose fibres resist, pull or are taut at rest; all homogeneous, so that finite elements are exact."""
+"""Blocks of muscle whose fibres resist, contract or are prestretched; all homogeneous, so that finite elements are exact."""
 
 from dataclasses import replace
 from functools import partial
@@ -27,13 +27,13 @@ def passive_febio(c4: float = 6.0, c5: float = 0.3) -> Material:
 
 
 def active(activation: float = 1.0, stress: float = STRESS) -> Material:
-    """Blemker's active fibres at an ``activation`` that grows to its full from frame 0 to 1; ``stress`` [MPa]."""
+    """Blemker's active fibres whose activation grows from 0 at frame 0 to ``activation`` at frame 1; ``stress`` [MPa]."""
     acting = make("fibre_active", ramp=ramp(activation), stress=f"{stress} MPa", optimal_stretch=OPTIMUM)
     return Material((acting,), fibre_laws.FibreActive(stress, OPTIMUM, activation))
 
 
 def two_families(degrees: float) -> Material:
-    """Two families at plus and minus ``degrees`` from the fibre, in the plane across z."""
+    """Two families at plus and minus ``degrees`` from the fibre, in the plane normal to z."""
     normal = (0.0, 0.0, 1.0)
     acting = make("holzapfel_ogden", k1="0.01 MPa", k2=1.0, angle=f"{degrees} deg", normal=normal)
     return Material((acting,), laws.HolzapfelOgden(0.01, 1.0, np.radians(degrees), normal))
@@ -62,7 +62,7 @@ def free(material: Material) -> Specimen:
 
 
 force, length = partial(force_entry, "fibres"), partial(stretch_entry, 0, "fibres")
-TOE, LINE = (1.25, "into their toe"), (1.6, "beyond their toe")  # the stretch, and where it is on the curve
+TOE, LINE = (1.25, "into their toe"), (1.6, "beyond their toe")  # the stretch, and its place on the curve
 STRONGER = "Peak stress 1 % too high."
 FAMILIES = NEO + two_families(30.0)
 TAUT, TAUTER = taut(NEO + passive(), 1.2), {"material": taut(NEO + passive(), 1.212)}
@@ -88,7 +88,7 @@ ENTRIES = (
             "passive_slack",
             "Passive fibres (Blemker) that are shortened carry nothing: force of the matrix alone",
             muscle(passive(), 0.8),
-            "Fibres across, where the block grows wider.",
+            "The fibres run across, where the block widens.",
             fibre=Y,
         ),
         truth=Specimen(NEO, "P2/P1", "uniaxial", 0.8).known_force,
@@ -112,14 +112,14 @@ ENTRIES = (
     ),
     length(
         "active_shortening",
-        "Active fibres free to shorten: length over that at rest",
+        "Active fibres free to shorten: length over rest length",
         free(NEO + active(0.1)),
         "Half the activation.",
         material=NEO + active(0.05),
     ),
     force(
         "passive_and_active",
-        "Passive and half activated fibres together, fixed long: force",
+        "Passive and half-activated fibres together, fixed at a stretch above 1: force",
         muscle(passive() + active(0.5), 1.25),
         "Activation 1 % too low.",
         material=NEO + (passive() + active(0.495)),
@@ -143,7 +143,7 @@ ENTRIES = (
     ),
     force(
         "prestretch_fixed",
-        "Muscle prestretched by 1.2 and fixed: force",
+        "Muscle with a prestretch of 1.2, held at its length: force",
         Specimen(TAUT, "P2/P1", "uniaxial", 1.0),
         "Prestretch 1 % too high.",
         **TAUTER,
@@ -151,12 +151,12 @@ ENTRIES = (
     replace(
         length(
             "prestretch_released",
-            "Muscle prestretched by 1.2 and released: length over that in the mesh, 1 / 1.2",
+            "Muscle with a prestretch of 1.2, released: length over that of the mesh, 1 / 1.2",
             free(TAUT),
             "Prestretch 1 % too high.",
             **TAUTER,
         ),
         truth=1 / 1.2,
-        source="The stretch that undoes the prestretch leaves no energy.",
+        source="The stretch that undoes the prestretch leaves no elastic energy.",
     ),
 )

@@ -1,4 +1,4 @@
-"""Friction: a block on an incline, one under a plate that slides over it, and one that slides over another."""
+"""Friction: a block on an incline, a block under a sliding plate, and a block that slides over another block."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,8 +18,8 @@ from fem_reference.verification.contact import CONTACT
 from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_hooke
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
-WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], [MPa/mm], and height [mm]
-NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, over the friction
+WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], contact stiffness [MPa/mm], height [mm]
+NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, divided by the friction
 LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
@@ -38,11 +38,11 @@ def incline(lab: Lab, friction: float) -> Finding:
     run = lab.solve(body, "Q1/P0", first_step=0.1, residual=1e-12, smallest_step=1e-3)
     reached = run.states[-1]
     work = reached.scalars["friction_work"]
-    return Finding(float(np.tan((0.0, *angles)[round(reached.number)])), note=f"{work:.2g} N mm are lost until then")
+    return Finding(float(np.tan((0.0, *angles)[round(reached.number)])), note=f"{work:.2g} N mm dissipated until then")
 
 
 def drag(lab: Lab, friction: float) -> Finding:
-    """The drag of a plate that slides over a clamped block, over its normal force."""
+    """The drag of a plate that slides over a clamped block, divided by its normal force."""
     above = ContactBone(
         "plate",
         HalfSpace((0.0, 0.0, HEIGHT - 0.005), (0.0, 0.0, -1.0)),
@@ -54,11 +54,11 @@ def drag(lab: Lab, friction: float) -> Finding:
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=1e-12).last
     along, _, across = state.forces["plate"]
     lost = state.scalars["friction_work"]
-    return Finding(float(along / -across), note=f"{lost:.2g} N mm are lost")
+    return Finding(float(along / -across), note=f"{lost:.2g} N mm are dissipated")
 
 
 def blocks(lab: Lab, friction: float) -> Finding:
-    """The drag of a block that slides over a larger one with an unrelated mesh, over its normal force."""
+    """The drag of a block that slides over a larger one with a non-matching mesh, divided by its normal force."""
     low, high = (
         shapes.box(counts, size, "tetrahedron")
         for counts, size in (((4, 3, 1), (1.0, 1.0, 0.3)), ((2, 3, 1), (0.5, 0.6, 0.3)))
@@ -70,7 +70,7 @@ def blocks(lab: Lab, friction: float) -> Finding:
     state = lab.solve(body, "P2/P1", first_step=0.1, residual=1e-12).last
     along, _, across = state.forces["low_z1 on high_z0"]
     lost = state.scalars["touching_friction_work"]
-    return Finding(float(-along / across), note=f"{lost:.2g} N mm are lost")
+    return Finding(float(-along / across), note=f"{lost:.2g} N mm are dissipated")
 
 
 DRAG = partial(CONTACT, unit="", given={"friction": FRICTION}, truth=FRICTION)
@@ -78,29 +78,29 @@ DRAG = partial(CONTACT, unit="", given={"friction": FRICTION}, truth=FRICTION)
 ENTRIES = (
     DRAG(
         name="sliding_blocks",
-        title="A block that slides over another: its drag over its normal force",
+        title="A block that slides over another: ratio of drag to normal force",
         measure=blocks,
         **control("friction 1 % greater", friction=1.01 * FRICTION),
         within=2e-3,
-        because="under a pressure of a thousandth of their moduli faces tilt by as much, and their normals do",
+        because="under a pressure of a thousandth of the moduli the faces tilt by about 0.001 rad, and with them their normals",
         source="Coulomb: a drag of the friction times the normal force",
     ),
     DRAG(
         name="incline",
-        title="A block on a plane that turns below it: the steepest at which it sticks",
+        title="A block on a plane that tilts: tangent of the steepest angle at which it sticks",
         measure=incline,
         **control("friction 0.11 % greater", friction=1.0011 * FRICTION),
         within=1.5e-4,
-        because="tangents are requested 0.01 % below and 0.02 % above: the block must stick at the first and be lost at the second",
+        because="tangents are 0.01 % below and 0.02 % above the friction: the block must stick at the first and slip at the second",
         source="Coulomb: the tangent of the angle is the coefficient of friction",
     ),
     DRAG(
         name="sliding_plate",
-        title="A plate that slides over a block: its drag over its normal force",
+        title="A plate that slides over a block: ratio of drag to normal force",
         measure=drag,
         **control("friction 1 % greater", friction=1.01 * FRICTION),
         within=1e-7,
-        because="each point that slides has its limit to rounding: what is left is the residual of 1e-12 N over forces of 1e-4 N",
+        because="each sliding point is at its Coulomb limit up to rounding: the residual of 1e-12 N remains, at forces of 1e-4 N",
         source="Coulomb: a drag of the friction times the normal force",
     ),
 )

@@ -1,4 +1,4 @@
-"""The benchmark of cardiac mechanics (Land et al. 2015): a beam that bends, a ventricle that is filled, one that contracts."""
+"""The cardiac mechanics benchmark (Land et al. 2015): a bending beam, a ventricle that is inflated, one that contracts."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,8 +18,8 @@ land = find("land")
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
 X = (1.0, 0.0, 0.0)
-APEX = 0.6  # how long cells are at the apex of the ventricle that contracts, over what they were
-AROUND = 7.85  # an eighth of a turn around the widest of the ventricle outside [mm]: a ladder's sizes are this over n
+APEX = 0.6  # length of the cells at the apex of the contracting ventricle, relative to that in the uniform mesh
+AROUND = 7.85  # an eighth of the outer circumference of the ventricle at its widest [mm]; the cell sizes are this divided by n
 ENDO, EPI = (0.0, 0.0, -17.0), (0.0, 0.0, -20.0)
 Point = tuple[float, float, float]
 
@@ -31,8 +31,8 @@ def helix(cells: Ints, points: Floats) -> Floats:  # noqa: ARG001
 
 @dataclass(frozen=True)
 class Heart:
-    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension wrong by
-    the factors ``stiff`` and ``active``.
+    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension
+    multiplied by ``stiff`` and ``active`` (1: the true values).
     """
 
     element: str
@@ -41,7 +41,7 @@ class Heart:
     active: float = 1.0
 
     def effects(self, number: int, on: str) -> tuple[Effect, ...]:
-        """The effects of the problem ``number`` of ``validation.land`` with this one's errors, its pressure ``on`` a surface."""
+        """The effects of the problem ``number`` of ``validation.land`` with these factors, its pressure ``on`` a surface."""
         problem = getattr(land, f"PROBLEM_{number}")
         law, tension = problem.law, problem.tension * self.active
         acting = (
@@ -58,7 +58,7 @@ class Heart:
         return Body(mesh, self.effects(1, "z0"), fixed, (0.0, 1.0), Along(X))
 
     def passive(self, n: int) -> Body:
-        """A quarter of the ventricle of problem 2, whose material is the same in all directions, with n cells around an eighth of
+        """A quarter of the ventricle of problem 2, whose material is isotropic, with n cells around an eighth of
         a turn.
         """
         mesh = shapes.ventricle_quarter((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree)
@@ -72,7 +72,7 @@ class Heart:
 
 
 def height(lab: Lab, n: int, body: str, point: Point, **heart: Any) -> float:
-    """The z [mm] to which the node at ``point`` goes, of a ``body`` of a :class:`Heart`."""
+    """The deformed z [mm] of the node that is at ``point`` at rest, in a ``body`` of a :class:`Heart`."""
     made = Heart(**heart)
     solved: Body = getattr(made, body)(n)
     state = lab.solve(solved, made.element, first_step=0.2, residual=RESIDUAL).last
@@ -93,7 +93,7 @@ def _crowded(mesh: Cells) -> Cells:
     return replace(mesh, points=land.wall(angle - np.pi, around, depth))
 
 
-BOUND = "a bound that this project sets itself, as the numbers are readings of figures at second hand, whose error no source states"
+BOUND = "a bound set by this project: the values were read off figures, second-hand, and no source states their error"
 HEART = partial(
     Entry,
     group="heart benchmark",
@@ -101,17 +101,17 @@ HEART = partial(
     measure=height,
     relative=True,
     kind="published",
-    source="Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py",
-    refinement=Refinement((2, 3), AROUND, order=None),  # the truth is published with few digits: no order
+    source="Land et al. 2015, doi 10.1098/rspa.2015.0641: second-hand readings of its figures, see validation/land.py",
+    refinement=Refinement((2, 3), AROUND, order=None),  # the published value has few digits, so no order is stated
     **SLOW,
 )
 APICES = {"inside": (0, ENDO), "outside": (1, EPI)}
-FINE = "the mesh leaves 0.2 %"
+FINE = "the discretisation error is 0.2 %"
 
 ENTRIES: tuple[Entry, ...] = (
     HEART(
         name="beam_follower",
-        title="A beam of heart muscle under a pressure that stays normal to it: height of its end, by quadratic tetrahedra",
+        title="A beam of heart muscle under a follower pressure: height of its end, by quadratic tetrahedra",
         given={"body": "beam", "point": land.BEAM_POINT, "element": "P2/P1", "degree": 1},
         **control("5 % stiffer", stiff=1.05),
         truth=land.TIP_OF_BEAM,
@@ -122,12 +122,12 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         HEART(
             name=f"ventricle_passive_{where}_{by}",
-            title=f"A ventricle filled at 10 kPa: where its apex goes {where}, by quadratic {by}",
+            title=f"A ventricle inflated to 10 kPa: height of its apex {where}, by quadratic {by}",
             given={"body": "passive", "point": point, "element": element},
             **control("20 % stiffer", stiff=1.2),
             truth=land.PASSIVE_APICES[place],
             within=0.005,
-            because=f"0.5 %: {BOUND}; the mesh leaves 0.1 %",
+            because=f"0.5 %: {BOUND}; the discretisation error is 0.1 %",
         )
         for element, by in (("P2/P1", "tetrahedra"), ("Q2/Q1", "hexahedra"))
         for where, (place, point) in APICES.items()
@@ -135,12 +135,12 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         HEART(
             name=f"ventricle_active_{where}",
-            title=f"A ventricle that contracts at 60 kPa against 15 kPa: where its apex goes {where}, by quadratic hexahedra",
+            title=f"A ventricle that contracts at 60 kPa against 15 kPa: height of its apex {where}, by quadratic hexahedra",
             given={"body": "contracting", "point": point, "element": "Q2/Q1"},
             **control("half the active tension", active=0.5),
             truth=land.ACTIVE_APICES[place],
             within=0.005,
-            because=f"0.5 %: {BOUND}; {FINE if place else 'the mesh leaves 1 % at the coarse and some 0.2 % at the fine step'}",
+            because=f"0.5 %: {BOUND}; {FINE if place else 'the discretisation error is 1 % (coarse) and some 0.2 % (fine)'}",
         )
         for where, (place, point) in APICES.items()
     ),

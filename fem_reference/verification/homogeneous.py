@@ -1,6 +1,6 @@
-"""Blocks in homogeneous states: finite elements that represent linear functions are exact there, so only rounding is left.
+"""Blocks in homogeneous states: every element represents linear functions exactly, so that only rounding remains.
 
-``Specimen`` serves the entries of fibres and loads too. The bulk modulus is finite in the body and in the truth alike.
+The entries of ``fibres`` and ``loads`` use ``Specimen`` too. The bulk modulus is finite in the body and in the closed form alike.
 """
 
 from collections.abc import Callable
@@ -38,22 +38,22 @@ class Material:
 
 
 def neo_hooke(mu: float) -> Material:
-    """``mu`` [MPa]."""
+    """A neo-Hookean law of the shear modulus ``mu`` [MPa]."""
     return Material((make("neo_hooke", mu=f"{mu} MPa"),), laws.neo_hooke(mu))
 
 
 def mooney_rivlin(c1: float, c2: float) -> Material:
-    """``c1``, ``c2`` [MPa]."""
+    """A Mooney-Rivlin law of ``c1`` and ``c2`` [MPa]."""
     return Material((make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"),), laws.MooneyRivlin(c1, c2))
 
 
 def guccione(c: float) -> Material:
-    """``c`` [MPa], with the exponents of Land et al. 2015, problem 1."""
+    """Guccione's law of ``c`` [MPa], with the exponents of Land et al. 2015, problem 1."""
     return Material((make("guccione", c=f"{c} MPa", bf=8.0, bt=2.0, bfs=4.0),), laws.Guccione(c, 8.0, 2.0, 4.0))
 
 
 def stretched(face: str, stretch: float) -> Prescribed:
-    """The face x1, y1 or z1 moved along its normal to ``stretch`` times its distance."""
+    """The face x1, y1 or z1 moved along its normal to ``stretch`` times its distance from the origin."""
     return Prescribed(face, face, ("xyz".index(face[0]),), radially(stretch - 1))
 
 
@@ -62,7 +62,7 @@ def everywhere(gradient: Matrix) -> tuple[Prescribed, ...]:
     return tuple(Prescribed(face, face, (0, 1, 2), Affine(gradient)) for face in SURFACE)
 
 
-# By name of a function of validation/homogeneous.py: the prescribed motion for a stretch or an amount, and the face that is pulled.
+# By name of a function of validation/homogeneous.py: the prescribed motion for a stretch or amount of shear, and the pulled face.
 MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
     "uniaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch)), "x1"),
     "equibiaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch), stretched("y1", stretch)), "x1"),
@@ -74,8 +74,8 @@ MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A block of ``SIZE`` in a homogeneous state: a mode of ``MODES`` and its ``amount``, a stretch, a shear or, where it is
-    pulled, a nominal stress [MPa] that ``loads`` bring.
+    """A block of ``SIZE`` in a homogeneous state: a mode of ``MODES`` and its ``amount``, a stretch, a shear or, for the mode
+    "pulled", the nominal stress [MPa] that the ``loads`` apply.
     """
 
     material: Material
@@ -87,13 +87,13 @@ class Specimen:
     loads: tuple[Effect, ...] = ()
 
     def body(self) -> Body:
-        """The block in two cells a side."""
+        """The block, two cells along each side."""
         acting = (*self.material.effects, resistance(self.element, self.bulk), *self.loads)
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
         return Body(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
 
     def last(self, lab: Lab) -> Frame:
-        """Its state."""
+        """The final state of the block."""
         return lab.solve(self.body(), self.element, **STEPS).last
 
     def _known(self) -> Any:
@@ -111,12 +111,12 @@ class Specimen:
 
 
 def force(lab: Lab, specimen: Specimen) -> float:
-    """The force along x on the face that is pulled [N]; sheared, x0 and x1 pull oppositely at its edges, and cancel."""
+    """The force along x on the pulled face [N]; in simple shear the forces at its edges with x0 and x1 cancel."""
     return float(specimen.last(lab).forces[MODES[specimen.mode][1]][0])
 
 
 def stretch(lab: Lab, specimen: Specimen, axis: int) -> float:
-    """The stretch of its outer dimension along x, y or z."""
+    """The stretch of the block along x, y or z, from its outer dimension."""
     return float(np.ptp(specimen.last(lab).points[:, axis]) / SIZE[axis])
 
 
@@ -124,15 +124,14 @@ BLOCK = partial(
     Entry,
     within=1e-11,
     relative=True,
-    because="The element represents the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's "
-    "method.",
+    because="The element represents the exact solution: rounding and the residual of 1e-13 N that ends Newton's method remain.",
     kind="closed form",
-    source="validation/homogeneous.py: balance by root finding (Ogden 1984, ch. 4.3)",
+    source="validation/homogeneous.py: equilibrium by root finding (Ogden 1984, ch. 4.3)",
 )
 
 
 def force_entry(group: str, name: str, title: str, specimen: Specimen, negative_control: str, **wrong: Any) -> Entry:
-    """The force on a ``specimen`` against its truth; in its negative control these fields are ``wrong``."""
+    """The force on a ``specimen`` against its closed form; the negative control replaces its fields by those in ``wrong``."""
     return BLOCK(
         name=name,
         group=group,
@@ -148,7 +147,7 @@ def force_entry(group: str, name: str, title: str, specimen: Specimen, negative_
 def stretch_entry(
     axis: int, group: str, name: str, title: str, specimen: Specimen, negative_control: str, **wrong: Any
 ) -> Entry:
-    """The stretch of a ``specimen`` along an axis against its truth."""
+    """The stretch of a ``specimen`` along an axis against its closed form."""
     other = force_entry(group, name, title, specimen, negative_control, **wrong)
     truth = partial(specimen.known_stretch, axis)
     return replace(other, unit="1", measure=stretch, given={**other.given, "axis": axis}, truth=truth)
@@ -160,8 +159,8 @@ STIFFER = "Shear modulus 1 % too high.", neo_hooke(1.01 * MU)
 OTHER_LAW = "A neo-Hookean law of the same shear modulus.", NEO
 STIFFER_MOONEY = "Both moduli 1 % too high.", mooney_rivlin(1.01 * 0.003, 1.01 * 0.002)
 AMOUNTS = {
-    "uniaxial": (1.6, "stretched along one axis, free across"),
-    "equibiaxial": (1.3, "stretched alike along two axes"),
+    "uniaxial": (1.6, "stretched along one axis, free laterally"),
+    "equibiaxial": (1.3, "stretched equally along two axes"),
     "planar": (0.7, "shortened with its width fixed"),
     "simple_shear": (0.6, "in simple shear"),
 }
@@ -195,7 +194,7 @@ ENTRIES = (
         1,
         GROUP,
         "neo_hookean_thinning_p2",
-        "Compressible neo-Hookean block stretched along one axis, by P2: how much it thins",
+        "Compressible neo-Hookean block stretched along one axis, by P2: its lateral stretch",
         Specimen(NEO, "P2", "uniaxial", 1.6, bulk=10 * MU),
         "Bulk modulus 1 % too high.",
         bulk=10.1 * MU,

@@ -1,4 +1,4 @@
-"""Inertia: a fall, a bar that vibrates, a block that swings far, and the limit of slow motion."""
+"""Inertia: free fall, a vibrating bar, a block in large swings, and the limit of slow motion."""
 
 from functools import partial
 
@@ -19,12 +19,12 @@ MODULUS = inertia.uniaxial_modulus(MU, BULK)
 OMEGA = inertia.first_frequency(MODULUS, DENSITY, LENGTH)
 PERIOD = 2 * np.pi / OMEGA
 G, FALLING = 9810.0, 0.1  # [mm/s^2], [s]
-SWINGING, STEPS = 0.17, 600  # [s] that ten swings take, and steps for them
+SWINGING, STEPS = 0.17, 600  # duration of ten swings [s], and their number of time steps
 STEP = {"first_step": 1.0, "largest_step": 1.0}
 
 
 def mass(factor: float = 1.0, spectral_radius: float = 0.9) -> Effect:
-    """Inertia, of ``factor`` times the density."""
+    """Inertia with ``factor`` times the density."""
     return make("inertia", density=factor * DENSITY, spectral_radius=spectral_radius)
 
 
@@ -35,7 +35,7 @@ def weight(axis: int, acceleration: float) -> Effect:
 
 
 def fallen(lab: Lab, factor: float) -> float:
-    """The fall [mm] of a free block; only its mass makes its tangent regular."""
+    """The fall [mm] of a free block; its tangent matrix is regular only because of its mass."""
     mesh = shapes.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     acting = (*neo_hooke(MU, 1e3 * MU), mass(factor), weight(2, -G))
     solved = lab.solve(Body(mesh, acting, (), frames(10, 10), interval=FALLING / 10), "P2/P1", **STEP)
@@ -43,15 +43,15 @@ def fallen(lab: Lab, factor: float) -> float:
 
 
 def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: int, seconds: float) -> Body:
-    """A bar that cannot widen, one end fixed along it, over ``count`` frames of so many ``seconds`` together."""
+    """A bar that cannot widen, one end fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
     mesh = shapes.box((8, 1, 1), (LENGTH, 1.0, 1.0), "tetrahedron")
     fixed = (*sliding("x0", "y0", "y1", "z0", "z1"), *prescribed)
     return Body(mesh, (*neo_hooke(MU, BULK, "P2"), *acting), fixed, frames(count, count), interval=seconds / count)
 
 
 def frequency(lab: Lab, steps: int, factor: float) -> float:
-    """The frequency of the first mode of a bar [rad/s] under a small weight along it, by ``steps`` a period over two periods: a
-    cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, with c the cosine of the phase of one step.
+    """The frequency of the first mode of a bar [rad/s] under a small axial weight, over two periods of ``steps`` time steps each:
+    a cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, with c the cosine of the phase of one step.
     """
     acting = mass(factor), weight(0, 1e-4 * MODULUS / DENSITY / LENGTH)
     solved = lab.solve(bar(acting, (), 2 * steps, 2 * PERIOD), "P2", **STEP, residual=1e-14)
@@ -65,8 +65,8 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
-    """The change of elastic, kinetic and potential energy together over the greatest kinetic energy, of a block clamped at one side
-    that swings under its own weight, applied at once.
+    """The greatest change of the total (elastic, kinetic and potential) energy over the greatest kinetic energy, of a block clamped
+    at one side that swings under its own weight, applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -77,18 +77,18 @@ def departure(lab: Lab, spectral_radius: float) -> Finding:
     here, before, after = kinetic[1:-1], kinetic[:-2], kinetic[2:]
     swings = int(((here > before) & (here >= after) & (here > kinetic.max() / 3)).sum())
     down = min(state.points[:, 2].min() for state in states)
-    note = f"{swings / 2:g} swings, in which the tip goes {-down:.2g} mm down; kinetic energy up to {kinetic.max():.3g} N mm"
+    note = f"{swings / 2:g} swings, in which the tip drops by {-down:.2g} mm; kinetic energy up to {kinetic.max():.3g} N mm"
     return Finding(float(np.abs(total).max() / kinetic.max()), note=note)
 
 
-# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the share of all frames.
+# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the share of the frames that have passed.
 FRAMES, WAY = 64, 1e-4 * LENGTH
 SMOOTH = Polynomial((0, 0, 0, 10, -15, 6))
 PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FRAMES))) for i in range(FRAMES + 1)))
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
-    """The force [N] of inertia after a quarter of a pull by 1e-4 of the length in so many ``periods`` of the first mode."""
+    """The force [N] due to inertia after a quarter of a pull by 1e-4 of the length that takes ``periods`` of the first mode."""
     pulled = (Prescribed("x1", "x1", (0,), PULL),)
     bodies = [bar(acting, pulled, FRAMES, periods * PERIOD) for acting in ((), (mass(factor),))]
     without, moving = (lab.solve(body, "P2", **STEP, residual=1e-14).states[16].forces["x1"][0] for body in bodies)
@@ -96,13 +96,13 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The force of inertia over its limit for slow motion, by a ladder of pulls, each twice as long as the last: their error is of
-    order 2 in the speed.
+    """The force due to inertia over its limit for slow motion, in a series of pulls that each take twice as long as the last: the
+    error is of order 2 in the speed.
     """
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
-    return Finding(ladder[-1][1] / known, order(ladder, 0.0), ladder, "sizes are pulls a period of the first mode")
+    return Finding(ladder[-1][1] / known, order(ladder, 0.0), ladder, "sizes are pulls per period of the first mode")
 
 
 MOVING = partial(Entry, group="inertia", kind="closed form")
@@ -110,20 +110,20 @@ MOVING = partial(Entry, group="inertia", kind="closed form")
 ENTRIES: tuple[Entry, ...] = (
     MOVING(
         name="free_fall",
-        title="Block that falls from rest for a tenth of a second",
+        title="Block that falls from rest for a tenth of a second: its fall",
         unit="mm",
         measure=fallen,
         given={"factor": 1.0},
-        **control("A mass 1 % larger than what is heavy.", factor=1.01),
+        **control("The inertial mass is 1 % larger than the heavy mass.", factor=1.01),
         truth=lambda: inertia.fall(G, FALLING),
         within=1e-9,
         relative=True,
-        because="Steps in time are exact for a constant acceleration; the residual force is 1e-8 N of 1e-2 N in each step.",
+        because="Time steps are exact for a constant acceleration; the residual is 1e-8 N in each step, at forces of 1e-2 N.",
         source="validation/inertia.py, fall",
     ),
     MOVING(
         name="bar_first_frequency",
-        title="Bar with one end fixed: frequency of its first longitudinal mode, by steps in time that are halved",
+        title="Bar with one end fixed: frequency of its first longitudinal mode, by time steps that are halved",
         unit="1/s",
         measure=frequency,
         given={"factor": 1.0},
@@ -131,9 +131,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=OMEGA,
         within=1e-3,
         relative=True,
-        because="A step that turns the mode by x = 2 pi / 80 slows it down by x^2 / 12 = 5.1e-4.",
+        because="With a phase of x = 2 pi / 80 in a time step the frequency is too low by x^2 / 12 = 5.1e-4.",
         source="validation/inertia.py, first_frequency",
-        refinement=Refinement((20, 40, 80), PERIOD, order=2, note="sizes are seconds of a step"),
+        refinement=Refinement((20, 40, 80), PERIOD, order=2, note="sizes are time steps in seconds"),
     ),
     MOVING(
         name="swing_energy",
@@ -142,16 +142,16 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=departure,
         given={"spectral_radius": 0.9},
-        **control("A step in time that leaves nothing of the shortest waves.", spectral_radius=0.0),
+        **control("Time integration that annihilates the shortest waves.", spectral_radius=0.0),
         truth=0.0,
         within=0.01,
-        because="Nothing takes energy away; 1 % in ten periods of 60 steps is what is asked for.",
+        because="Nothing dissipates energy; a drift of 1 % in ten periods of 60 time steps is allowed.",
         kind="property",
         source="conservation of energy",
     ),
     MOVING(
         name="slow_pull",
-        title="Bar that is pulled more and more slowly: what inertia adds to the force, over what it is in the limit",
+        title="Bar that is pulled more and more slowly: what inertia adds to the force, divided by its limit for slow motion",
         unit="",
         measure=slow,
         given={"factor": 1.0},
@@ -159,8 +159,8 @@ ENTRIES: tuple[Entry, ...] = (
         truth=1.0,
         within=0.02,
         relative=True,
-        because="The next order of the expansion is the square of a period over the time, times numbers of order 1: below 1 %; "
-        "steps of a sixty-fourth of the pull add as much.",
+        because="The next term of the expansion is of the order of (period / duration of the pull)^2: below 1 %; time steps of a "
+        "sixty-fourth of the pull add up to 1 % too.",
         source="validation/inertia.py, pull_of_inertia",
     ),
 )

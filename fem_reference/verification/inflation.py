@@ -1,7 +1,7 @@
-"""Hollow bodies that are blown up: a sphere, past the point where its pressure is largest, and a tube.
+"""Inflation of hollow bodies: a sphere, past its limit point (the largest pressure), and a tube.
 
-Where the inner face is moved, the pressure is the slope of the body's energy over the enclosed volume: the energy grows by the
-work of the pressure. The energy is a polynomial through the values at a few stretches of the inner face.
+Where the motion of the inner face is prescribed, the pressure is the derivative of the energy with respect to the enclosed volume,
+as the energy grows by the work of the pressure. A polynomial interpolates the energy at a few stretches of the inner face.
 """
 
 from collections.abc import Callable
@@ -23,28 +23,28 @@ from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, f
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
-NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible material
+NEARLY = 1e6  # [MPa], the bulk modulus where the closed form is for incompressible material
 INNER, OUTER, LENGTH = 10.0, 20.0, 5.0  # radii of sphere and tube, length of the tube [mm]
 STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the sphere is largest at 1.83
-PRESSED = 0.7  # [MPa], of 0.82 that the sphere can bear
-# A soft sphere [MPa] with a membrane [mm] on its inner face, which bears most of a pressure [MPa].
+PRESSED = 0.7  # [MPa]; the limit pressure of the sphere is 0.82
+# A soft sphere [MPa] with a membrane [mm] on its inner face, which carries most of a pressure [MPa].
 SOFT, THICKNESS, SHEATHED = 0.01, 0.5, 0.05
-RESIDUAL = 1e-8  # [N, mm3], where forces are some 100 N
+RESIDUAL = 1e-8  # [N, mm3], at forces of about 100 N
 
 Material = tuple[Effect, ...]
-Pressures = Callable[[float], float]  # [MPa] by the stretch a / A of the inner face
-# The largest stretch, and a value read from the pressures up to there.
+Pressures = Callable[[float], float]  # the pressure [MPa] at a stretch a / A of the inner face
+# The largest stretch, and the value that is read from the pressures up to it.
 Reading = tuple[float, Callable[[Pressures], float]]
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """Stretches from 1 to the largest, closer at both ends, so that a polynomial through values there is accurate in between."""
+    """Stretches from 1 to the largest, denser at both ends (Chebyshev), so that the interpolating polynomial is accurate."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 
 
 def slope(solved: Run) -> Chebyshev:
-    """The slope of the energy over the frames [N mm]."""
+    """The derivative of the energy with respect to the frame number [N mm]."""
     end = solved.last.number
     frames, energies = zip(*((state.number, state.scalars["energy"]) for state in solved.states), strict=True)
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
@@ -64,7 +64,7 @@ def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, 
 
 
 def top(pressures: Pressures) -> float:
-    """The stretch at which the ``pressures`` have their largest, from STRETCH to BEYOND."""
+    """The stretch between STRETCH and BEYOND at which the ``pressures`` are largest."""
     found = minimize_scalar(lambda stretch: -pressures(stretch), bounds=(STRETCH, BEYOND), options={"xatol": 1e-7})
     return float(found.x)
 
@@ -99,7 +99,7 @@ def tube_force(lab: Lab, n: int, **given: Any) -> float:
 
 
 def sheathed(lab: Lab, n: int, thickness: float, element: str) -> float:
-    """The mean stretch of the inner face of a soft sphere with a membrane of a ``thickness`` [mm] on it, under a fluid in it."""
+    """The mean stretch of the inner face of a soft sphere with a membrane of a ``thickness`` [mm] on it, under pressure."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, n, ELEMENTS[element][0], 2)
     membrane = make("membrane", on="inner", thickness=thickness, mu=MU)
     fluid = make("pressure", on="inner", pressure=SHEATHED, ramp=ramp())
@@ -110,7 +110,7 @@ def sheathed(lab: Lab, n: int, thickness: float, element: str) -> float:
 
 
 def true_sheathed() -> float:
-    """The stretch at which the pressures that the membrane and the sphere bear add up to that of the fluid."""
+    """The stretch at which the pressures that the membrane and the sphere carry add up to that of the fluid."""
 
     def left(stretch: float) -> float:
         own = SOFT * true_pressure(TRUE_LAW, stretch)  # pressures are proportional to the moduli
@@ -135,8 +135,8 @@ def true_tube(which: int) -> float:
 
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
 NEARLY_INCOMPRESSIBLE = neo_hooke(MU, NEARLY)
-STRAIGHT = control("straight cells, whose surfaces have flat facets", degree=1)
-OTHER_LAW = "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising"
+STRAIGHT = control("straight cells, with flat facets on the surfaces", degree=1)
+OTHER_LAW = "Mooney-Rivlin material of the same shear modulus, whose pressure keeps rising"
 RISING = control(OTHER_LAW, material=MOONEY_RIVLIN)
 INFLATED = partial(Entry, group="inflation", relative=True, kind="closed form")
 FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py")
@@ -156,14 +156,14 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         FINITE(
             name=f"inflation_sphere_pressure_{cells}",
-            title=f"A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved {cells} ({element})",
+            title=f"A thick sphere inflated to 1.5 times its inner radius: its pressure, by curved {cells} ({element})",
             unit="MPa",
             measure=blown,
             given={"reading": AT_STRETCH, "element": element, "material": NEO_HOOKE},
             **STRAIGHT,
             truth=lambda: true_pressure(TRUE_LAW),
             within=within,
-            because=f"discretisation of order 4, {left} cells through the wall; the polynomial of the energy adds 1e-6",
+            because=f"discretisation error of order 4, {left} cells through the wall; interpolating the energy adds 1e-6",
             refinement=Refinement(counts, INNER / 2, order=4),
             slow=True,
             slow_negative_control=element == "P2/P1",
@@ -175,97 +175,97 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
-        title="A thick Mooney-Rivlin sphere blown up to 1.5 times its inner radius: its pressure",
+        title="A thick Mooney-Rivlin sphere inflated to 1.5 times its inner radius: its pressure",
         unit="MPa",
         measure=blown,
         given={"reading": AT_STRETCH, "n": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
         **control("neo-Hookean material of the same shear modulus", material=NEO_HOOKE),
         truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
-        because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
+        because="discretisation error of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
         **SLOW,
     ),
     FINITE(
         name="inflation_sphere_stretch",
-        title="A thick sphere under the pressure of a fluid that follows its face: the stretch of its inner radius",
+        title="A thick sphere under a follower pressure inside: the stretch of its inner radius",
         unit="1",
         measure=pressed,
         given={"mu": MU},
         **control("the shear modulus is 1 % too large", mu=1.01 * MU),
         truth=lambda: brentq(lambda stretch: true_pressure(TRUE_LAW, stretch) - PRESSED, 1.1, 1.7, xtol=1e-10),
         within=4e-4,
-        because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
+        because="discretisation error of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
         refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
     FINITE(
         name="inflation_membrane",
-        title="A soft sphere lined with a membrane that bears nine tenths of the pressure in it: the stretch of its inner radius",
+        title="A soft sphere lined with a membrane that carries nine tenths of the inner pressure: the stretch of its inner radius",
         unit="1",
         measure=sheathed,
         given={"element": "P2/P1", "thickness": THICKNESS},
         **control("the membrane is 1 % too thick", thickness=1.01 * THICKNESS),
         truth=true_sheathed,
         within=2e-4,
-        because="discretisation of order 4, 8e-5 with 2 cells through the wall (P2/P1), whose curved faces carry the membrane",
-        source="Of the membrane p = 2 sigma h / r, incompressible neo-Hookean (Holzapfel 2000, ch. 6.5; validation/balloon.py)",
+        because="discretisation error of order 4, 8e-5 with 2 cells through the wall (P2/P1), with the membrane on their faces",
+        source="Membrane: p = 2 sigma h / r, incompressible neo-Hookean (Holzapfel 2000, ch. 6.5; validation/balloon.py)",
         refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
     LIMIT(
         name="inflation_limit_pressure",
-        title="A thick sphere blown up past its limit: the largest pressure that it bears",
+        title="A thick sphere inflated past its limit point: its largest pressure",
         unit="MPa",
         given={**CELLS, "reading": LARGEST},
         **STRAIGHT,
         truth=lambda: TRUE_SPHERE.limit_point()[1],
         within=4e-4,
-        because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
+        because="discretisation error of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); interpolation adds 1e-6",
         slow_negative_control=True,
     ),
     LIMIT(
         name="inflation_limit_stretch",
-        title="A thick sphere blown up past its limit: the stretch of its inner radius at the largest pressure",
+        title="A thick sphere inflated past its limit point: the stretch of its inner radius at the largest pressure",
         unit="1",
         given={**CELLS, "reading": WHERE_LARGEST},
         **RISING,
         truth=lambda: TRUE_SPHERE.limit_point()[0],
         within=1e-4,
-        because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
+        because="discretisation error of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
         **SLOW,
     ),
     LIMIT(
         name="inflation_fall_beyond_limit",
-        title="A thick sphere blown up to 2.2 times its inner radius: the fall of its pressure from the largest",
+        title="A thick sphere inflated to 2.2 times its inner radius: the drop of its pressure from the largest",
         unit="MPa",
         given={**CELLS, "reading": FALL},
         **RISING,
         truth=lambda: TRUE_SPHERE.limit_point()[1] - TRUE_SPHERE.pressure(BEYOND),
         within=2e-3,
-        because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
+        because="the drop is 4 % of pressures whose errors of 1e-4 largely cancel: 2e-4 remain (Q2/Q1, 4 cells through the wall)",
         slow=True,
     ),
     FINITE(
         name="inflation_tube_pressure",
-        title="A thick tube of constant length blown up to 1.5 times its inner radius: its pressure",
+        title="A thick tube of constant length inflated to 1.5 times its inner radius: its pressure",
         unit="MPa",
         measure=tube_pressure,
         given={"element": "Q2/Q1"},
         **control("one end of the tube is free to move along it", ends=("bottom",)),
         truth=lambda: true_tube(0),
         within=5e-5,
-        because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",
+        because="discretisation error of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",
         refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
     ),
     FINITE(
         name="inflation_tube_axial_force",
-        title="A thick tube of constant length blown up to 1.5 times its inner radius: the force along its axis",
+        title="A thick tube of constant length inflated to 1.5 times its inner radius: its axial force",
         unit="N",
         measure=tube_force,
         given={"element": "P2/P1"},
         **STRAIGHT,
         truth=lambda: true_tube(1),
         within=5e-5,
-        because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
+        because="discretisation error of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
         refinement=Refinement((1, 2, 3), INNER / 2, order=4),
     ),
 )

@@ -10,28 +10,28 @@ from fem_reference.runs.store import Run
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx.session import Session
 
-_TIME_LIMIT = "30 min"  # of one body; the slowest of the catalogue takes about a minute
+_TIME_LIMIT = "30 min"  # for one body; the slowest of the catalogue takes about a minute
 
 
 class FemLab:
-    """Solves bodies by the reference in a ``session``, and by the second opinion."""
+    """Solves bodies with the reference, in a ``session`` of FEniCSx, and with the second opinion, scikit-fem."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` by the reference, FEniCSx, within a time limit."""
+        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
         return second_check.confirmed_body(body, solved)
 
     def second(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` by the second opinion, scikit-fem."""
+        """The states of ``body`` as the second opinion, scikit-fem, finds them."""
         return scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(element=element, **settings))
 
 
 @contextmanager
 def lab() -> Iterator[FemLab]:
-    """A lab; its process ends with it. MissingSoftware where FEniCSx is not installed."""
+    """A lab, whose process ends with the context. MissingSoftware where FEniCSx is not installed."""
     with fenicsx.session() as session:
         yield FemLab(session)

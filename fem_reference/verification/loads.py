@@ -17,7 +17,7 @@ from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, S
 loads = parts.find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
-LARGE = (100.0, 50.0, 60.0)  # of a block of muscle of 300 ml [mm]
+LARGE = (100.0, 50.0, 60.0)  # sides of a block of muscle of 300 ml [mm]
 # Height of a soft column [mm], its bulk modulus [MPa] and its weight [N/mm3], under which it sinks by a tenth of its height.
 HEIGHT, SOFT, WEIGHT = 10.0, 5 * MU, 1e-3
 FLUID, COMPRESSIBLE = 0.1, 1.0  # a pressure, and the bulk modulus of the block that it shrinks [MPa]
@@ -26,7 +26,7 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
-    """Gravity along -z, ``times`` that of the earth, on ``density`` [tonne/mm3]."""
+    """Gravity along -z, ``times`` that of the earth, on a material of ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
     return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 
@@ -49,7 +49,7 @@ def loaded(
     frames: int = 1,
     bulk: float = BULK,
 ) -> Run:
-    """The states of a block, with some of its faces ``wet``, under a ``load``, up to so many ``frames``."""
+    """The states of a block, with some of its faces ``wet``, under a ``load``, over a number of ``frames``."""
     mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
     mesh = replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in wet])})
     body = Body(mesh, (*parts.neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
@@ -72,7 +72,7 @@ def top(lab: Lab, cells: int, element: str) -> float:
 
 
 def shrunk(lab: Lab, pressure: float) -> float:
-    """V/V0 of a block in a fluid of ``pressure`` [MPa], free to shrink on its planes of symmetry."""
+    """V/V0 of a block in a fluid of ``pressure`` [MPa]; it slides on its planes of symmetry."""
     solved = loaded(lab, ("x1", "y1", "z1"), pressed(pressure), parts.SYMMETRY, bulk=COMPRESSIBLE)
     return solved.last.scalars["volume_ratio"]
 
@@ -85,7 +85,7 @@ def left_over(lab: Lab, faces: tuple[str, ...]) -> float:
 
 
 def turned(lab: Lab, load: Effect) -> float:
-    """A block leans under a ``load``, then its base is turned by a quarter circle: the distance to itself turned [mm]."""
+    """The largest error [mm] of a node when the base of a block that leans under a ``load`` is turned by 90 degrees."""
     solved = loaded(lab, ("x1",), load, (Prescribed("z0", "z0", (0, 1, 2), QUARTER),), frames=2)
     before = solved.states[1].points
     return parts.farthest(solved.last.points, before + QUARTER(before, 2))
@@ -104,14 +104,14 @@ ENTRIES: tuple[Entry, ...] = (
         **parts.control("The density of fat instead of muscle.", density=FAT),
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
-        because="The forces of a discrete equilibrium sum to zero whatever the mesh, but for the residual: it is 1e-10 N as a root "
-        "of a sum of squares over 150 free nodes, and the sum of all may be the root of 150 times as large.",
+        because="The forces of a discrete equilibrium sum to zero on every mesh, up to the residual: over 150 free nodes its norm "
+        "is 1e-10 N, so that its sum may be sqrt(150) times as large.",
         kind="closed form",
         source="Density times acceleration times volume.",
     ),
     LOAD(
         name="heavy_column",
-        title="Soft column in a smooth box that sinks under its own weight, by Q2: displacement of its top",
+        title="Soft column in a frictionless box that sinks under its own weight, by Q2: displacement of its top",
         unit="mm",
         measure=top,
         given={"element": "Q2"},
@@ -119,7 +119,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: loads.column_top(MU, SOFT, WEIGHT, HEIGHT),
         within=1e-8,
         relative=True,
-        because="Discretisation: the top of 8 cells converges at twice the degree of the element, order 4.",
+        because="Discretisation error with 8 cells; the top converges at twice the degree of the element, order 4.",
         kind="closed form",
         source="validation/loads.py, column_top: balance integrated by hand",
         refinement=Refinement((2, 4, 8), HEIGHT, order=4),
@@ -134,8 +134,8 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: loads.pressed_volume(COMPRESSIBLE, FLUID),
         within=1e-12,
         relative=True,
-        because="The element has the exact answer, but for the residual: 1e-13 N may add up over the 100 nodes to 10 times as "
-        "much, and a pressure of this over a face of 3 mm2 changes the volume by 3e-13.",
+        because="The element represents the exact solution, up to the residual: 1e-13 N may add up to 1e-12 N over 100 nodes, and "
+        "as a pressure on a face of 3 mm2 this changes the volume by 3e-13.",
         kind="closed form",
         source="validation/loads.py, pressed_volume",
     ),
@@ -148,22 +148,22 @@ ENTRIES: tuple[Entry, ...] = (
         **parts.control("The top is dry.", faces=parts.SURFACE[:-1]),
         truth=0.0,
         within=1e-12,
-        because="A pressure on a closed surface has no resultant, on a discrete one either, but for the residual: 1e-13 N may add "
-        "up over 75 free nodes to 9 times as much.",
+        because="A pressure on a closed surface, discrete or not, has no resultant, up to the residual: 1e-13 N may add up to "
+        "9e-13 N over 75 free nodes.",
         kind="property",
         source="The divergence of the cofactor of F vanishes (Piola; Holzapfel 2000, ch. 2.4).",
     ),
     LOAD(
         name="pressure_turns",
-        title="Block that leans under a pressure on one side, turned by a quarter circle: largest difference to itself turned",
+        title="Block that leans under a pressure on one side, then turned by 90 degrees: largest error of a node",
         unit="mm",
         measure=turned,
         given={"load": pressed(0.2 * MU)},
         **parts.control("A dead load of the same size.", load=dead(-0.2 * MU)),
         truth=0.0,
         within=1e-10,
-        because="A pressure turns with the surface, but for the residual: 1e-13 N may add up to 1e-12 N, and the block that stands "
-        "bends under a force at its top by 1 mm for every 0.05 N: 2e-11 mm, before the turn and after.",
+        because="A pressure turns with the surface, up to the residual: 1e-13 N may add up to 1e-12 N, which bends the block (0.05 "
+        "N/mm for a force at its top) by 2e-11 mm before the turn and after.",
         kind="property",
         source="Objectivity: Nanson's formula turns with F.",
     ),
@@ -171,9 +171,9 @@ ENTRIES: tuple[Entry, ...] = (
         0,
         "loads",
         "dead_pull",
-        "Block pulled by a dead force: its stretch",
+        "Block pulled by a dead load: its stretch",
         PULLED,
-        "The force spread over the area as it is now.",
+        "The force acts per current instead of rest area.",
         loads=(make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=parts.ramp()),),
     ),
 )

@@ -1,7 +1,7 @@
-"""Idealised muscles beside measured ones: a vastus lateralis with its aponeurosis, and a ball pressed into a tibialis anterior.
+"""Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a ball on a tibialis anterior.
 
-The material is the shipped one, chosen from other sources and never fitted to these. Shapes are idealised, and their sizes from
-memory or assumed, so that neither entry can validate. The measurements of the publications are in ``validation/experiments``.
+The material is the shipped one, chosen from other sources and never fitted to these. Shapes are idealised, and their sizes are
+from memory or assumed, so that neither entry can validate. The measurements of the publications are in ``validation/experiments``.
 """
 
 import math
@@ -29,7 +29,7 @@ from fem_reference.verification.parts import NO_GRADIENT, SLOW, clamped, control
 
 ELEMENT = "Q2/Q1"
 # Vastus lateralis: Ward et al. 2009, doi 10.1007/s11999-008-0594-8, and arms of the knee's extensors, all from memory.
-FIBRE, OPTIMAL, PENNATION, ARM = 99.4, 2.7, math.radians(18.4), 40.0  # mm at a sarcomere length of um, rad, mm
+FIBRE, OPTIMAL, PENNATION, ARM = 99.4, 2.7, math.radians(18.4), 40.0  # [mm] at a sarcomere length [um], [rad], [mm]
 APONEUROSIS, HALF_WIDTH, THIN = 174.0, 32.5, 1.0  # length, half the width and thickness of the aponeurosis [mm]
 FLEXION = math.radians(110 - 50)
 LENGTH = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL  # of the fibres at 50 degrees [mm]
@@ -38,13 +38,13 @@ ALONG, THICK = LENGTH * math.cos(PENNATION), LENGTH * math.sin(PENNATION)
 L1, L2, STRAIGHT = 2.7, 46.4, 1.03
 # Tibialis anterior of a rat: half its length and width, thickness, and the ball [mm]; assumed.
 TIBIALIS, BALL = (12.0, 5.0, 6.0), 3.0
-MU = 0.01  # of the shipped matrix [MPa]
+MU = 0.01  # shear modulus of the shipped matrix [MPa]
 _MU, _ALPHA = find("bosboom_2001", "ogden_mu", ""), find("bosboom_2001", "ogden_alpha", "")
 
 
 @dataclass(frozen=True)
 class Above:
-    """The height over the muscle's upper face [mm]: of its aponeurosis."""
+    """The height above the muscle's upper face [mm]: the aponeurosis lies above it."""
 
     def __call__(self, points: Floats) -> Floats:
         """The heights (n,) of points (n, 3) [mm]."""
@@ -52,7 +52,7 @@ class Above:
 
 
 def vastus(n: int, arm: float) -> Body:
-    """Half a planar muscle whose fibres rise from the bone to an aponeurosis, of which the end is pulled by an ``arm`` [mm] times
+    """Half a planar muscle whose fibres rise from the bone to an aponeurosis, whose end is pulled by a moment ``arm`` [mm] times
     the knee's flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
     """
     counts, size = (6 * n, 2 * n, 2 * n), (APONEUROSIS, THICK, HALF_WIDTH)
@@ -86,8 +86,8 @@ def vastus_stretch(lab: Lab, n: int, arm: float) -> float:
 
 
 class FittedOgden(Energy):
-    """``2 mu/a^2 (l1^a + l2^a + l3^a - 3)`` of the principal stretches without their share in the change of volume (Ogden 1972),
-    with the even exponent a = 22 next to the 21.4 that Bosboom et al. 2001 fitted: a sum of even powers is a polynomial of
+    """``2 mu/a^2 (l1^a + l2^a + l3^a - 3)`` of the isochoric principal stretches (Ogden 1972),
+    with the even exponent a = 22 nearest to the 21.4 that Bosboom et al. 2001 fitted: a sum of even powers is a polynomial of
     invariants (Newton's identities), smooth at rest. ``mu``: shear modulus at rest [MPa].
     """
 
@@ -95,7 +95,7 @@ class FittedOgden(Energy):
     mu: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that this law gives the body at rest."""
+        """The elastic moduli of this law at rest."""
         return Moduli(shear=self.mu)
 
     def energy(self, state: State) -> Any:
@@ -131,13 +131,13 @@ def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> floa
 
 
 def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
-    """The force on the shipped material, of the shear modulus ``mu`` [MPa], over that on the fitted law."""
+    """The force on the shipped material, with the shear modulus ``mu`` [MPa], over that on the fitted law."""
     shipped = make("neo_hooke", mu=f"{mu} MPa"), make("fibre_passive", **FIBRES)
     fitted = (FittedOgden.model_validate({"mu": f"{_MU.value} kPa"}),)
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# By depth [mm]: half the difference of the forces at the exponents 16 and 28 over the force at 22, for the deviation 5.7 of 6.
+# By depth [mm]: half the difference of the forces at the exponents 16 and 28, over that at 22; the reported deviation is 5.7.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
@@ -149,20 +149,20 @@ _OTHER_MU = (
 
 
 def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
-    """The indentation by a ``depth`` [mm], a ``share`` of the thickness in words."""
+    """The indentation by a ``depth`` [mm]; ``share`` of the thickness in words."""
     spread = (_MU.sd or math.nan) / _MU.value
     return EXPERIMENT(
         name=name,
         title=f"Ball pressed across the fibres into an idealised tibialis anterior, by a {share} of its thickness: force "
-        "over that of the law that was fitted to indentations",
+        "over that of a law fitted to indentations",
         unit="1",
         measure=indentation,
         given={"depth": depth, "mu": MU},
         **control("Shear modulus 10 % too high.", mu=1.1 * MU),
         truth=1.0,
         within=math.hypot(spread, _BY_EXPONENT[depth]),
-        because=f"The deviations of mu, {100 * spread:.0f} %, and of the exponent, {100 * _BY_EXPONENT[depth]:.0f} % of the force "
-        "at this depth, as if independent.",
+        because=f"Standard deviations of mu, {100 * spread:.0f} %, and of the exponent, {100 * _BY_EXPONENT[depth]:.0f} % of the "
+        "force at this depth, taken as independent.",
         source="bosboom_2001, read in: abstract; doi 10.1016/S0021-9290(01)00083-5; shape, ball and depth assumed; mu read as the "
         "shear modulus, from memory",
         refinement=Refinement((1, 2), TIBIALIS[0] / 4, None, note=f"{_FINER} {_OTHER_MU}"),
@@ -183,7 +183,7 @@ ENTRIES = (
         **control("Moment arm 10 % too great.", arm=1.1 * ARM),
         truth=_STRETCH,
         within=_SD,
-        because="The standard deviation of the ratio of two sarcomere lengths of six people, as if independent.",
+        because="The standard deviation of the ratio of two mean sarcomere lengths of six people, taken as independent.",
         source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture, arm and tendon from memory",
         refinement=Refinement(
             (1, 2), APONEUROSIS / 6, None, note=f"{_FINER} The tendon beyond the muscle is rigid here."

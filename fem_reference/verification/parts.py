@@ -1,6 +1,6 @@
-"""Parts of entries: truths, negative controls, materials and constraints, and readings from the states of a body.
+"""Parts of entries: true values, negative controls, materials, constraints, and readings from the states of a body.
 
-The truths are in ``validation/``: closed forms and published numbers, which import nothing from this package.
+The true values are in ``validation/``: closed forms and published numbers, which import nothing from this package.
 """
 
 import importlib
@@ -45,22 +45,22 @@ def find(name: str) -> ModuleType:
 
 
 def control(words: str, **wrong: object) -> dict[str, Any]:
-    """The negative control of an entry: one mistake in words, and the values with which it is made."""
+    """The negative control of an entry: a deliberate mistake in words, and the wrong values that make it."""
     return {"negative_control": words, "wrong": wrong}
 
 
 def ramp(full: float = 1.0) -> list[dict[str, float]]:
-    """A ramp from nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
+    """A ramp from 0 at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
 
 
 def clamped(*regions: str, components: tuple[int, ...] = (0, 1, 2)) -> tuple[Prescribed, ...]:
-    """Regions that stay where they are, along the axes ``components``."""
+    """Regions whose displacements along the axes ``components`` are zero."""
     return tuple(Prescribed(region, region, components, Rest()) for region in regions)
 
 
 def sliding(*faces: str) -> tuple[Prescribed, ...]:
-    """Faces such as ``x0`` that stay in their planes, without friction."""
+    """Faces such as ``x0`` that slide in their planes without friction."""
     return tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in faces)
 
 
@@ -80,20 +80,20 @@ def neo_hooke(mu: float, bulk: float, element: str = "P2/P1") -> tuple[Effect, .
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
-    """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
+    """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], for elements with a pressure."""
     return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), resistance("P2/P1", bulk)
 
 
 def frames(last: float, count: int) -> tuple[float, ...]:
-    """``count`` frames after 0, evenly to the ``last``."""
+    """Frame 0 and ``count`` evenly spaced frames after it, up to ``last``."""
     return tuple(np.linspace(0, last, count + 1).tolist())
 
 
 def farthest(points: Floats, others: Floats) -> float:
-    """The greatest distance [mm] of points (n, 3) from ``others`` (n, 3)."""
+    """The greatest distance [mm] between corresponding ``points`` (n, 3) and ``others`` (n, 3)."""
     return float(np.linalg.norm(points - others, axis=1).max())
 
 
 def nearest(points: Floats, place: Iterable[float]) -> int:
-    """The index of that of ``points`` (n, 3) which is nearest to a ``place`` (3,)."""
+    """The index of the one of ``points`` (n, 3) that is nearest to a ``place`` (3,)."""
     return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))

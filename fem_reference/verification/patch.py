@@ -1,4 +1,4 @@
-"""Patch tests: linear functions and turns of any size, which every element must represent exactly on cells of any shape."""
+"""Patch tests: linear displacements and finite rotations, which every element must represent exactly on cells of any shape."""
 
 from dataclasses import replace
 
@@ -13,16 +13,16 @@ from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
 from fem_reference.verification.parts import SURFACE, control, farthest, resistance
 
-# Of displacement: stretch, shear and a turn at once; it takes the volume to 1.2 times that at rest.
+# The displacement gradient of a stretch, a shear and a rotation at once, which changes the volume to 1.2 times that at rest.
 GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
 COUNTS, BUMP = (2, 2, 3), 0.1
 AXIS, ANGLE, CENTRE = (1.0, 2.0, 3.0), 1.0, (1.0, -2.0, 0.5)  # rad, mm
 ENDS = ("z0", "z1")
-AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a step that fails is not cut
+AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a failed step is not cut into smaller ones
 
 
 def patch(element: str, degree: int, share: float = 1.0) -> Body:
-    """A warped box whose whole surface follows ``share`` of ``GRADIENT``, for an ``element`` on cells of a ``degree``."""
+    """A warped box whose whole surface moves by ``share`` times ``GRADIENT``, for an ``element`` on cells of a ``degree``."""
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], degree, BUMP)
     a, b, c = ((share * x, share * y, share * z) for x, y, z in GRADIENT)
     return Body(mesh, (*NEO.effects, resistance(element, BULK)), everywhere((a, b, c)), (0, 1))
@@ -41,8 +41,8 @@ def turn(share: float) -> Turn:
 
 
 def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float) -> tuple[Frame, Frame]:
-    """A warped box before and after a turn of its ``faces``, z1 or the whole surface by ``further`` times as much. The surface
-    turns in one step, two ends in several. Before, at frame 1, the box is at rest, or contracted by its material.
+    """A warped box before and after a turn of its ``faces``; z1, or the whole surface, turns ``further`` times the angle. The whole
+    surface turns in one step, two ends in several. Before the turn, at frame 1, the box is at rest, or contracted by its fibres.
     """
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], 1, BUMP)
     moved = SURFACE if faces == SURFACE else ("z1",)
@@ -64,9 +64,9 @@ def turned_energy(lab: Lab, material: Material, element: str, faces: tuple[str, 
     return after.scalars["energy"] - before.scalars["energy"]
 
 
-# Between rigid ends a height h apart, n free nodes of a block of the volume V move softest with the stiffness mu (pi / h)^2 V / n:
-# 0.003 N/mm.
-LEFT = "Newton's residual of 1e-13 N is left, 3e-11 mm where the block is softest (some 0.003 N/mm), and rounding"
+# The softest mode of a block of volume V with n free nodes between rigid ends a height h apart has a stiffness of
+# mu (pi / h)^2 V / n = 0.003 N/mm.
+LEFT = "rounding and Newton's residual of 1e-13 N remain, 3e-11 mm in the softest mode of the block (about 0.003 N/mm)"
 BLOCK = Entry(
     name="turned_block",
     group="rigid motion",
@@ -77,9 +77,9 @@ BLOCK = Entry(
     **control("The surface is turned 1 % further.", further=1.01),
     truth=0.0,
     within=1e-10,
-    because=f"A turned body is a linear function of the body at rest: {LEFT}.",
+    because=f"A rotation is a linear function of the rest positions: {LEFT}.",
     kind="property",
-    source="Objectivity: a law sees C = F^T F only.",
+    source="Objectivity: a law depends on C = F^T F only.",
 )
 ELEMENT_AND_DEGREE = (*((element, 1) for element in ELEMENTS), ("Q2/Q1", 2))
 
@@ -95,7 +95,7 @@ ENTRIES = (
             given={"element": element, "degree": degree},
             **control("The surface is moved 1 % too far.", share=1.01),
             because=f"Linear functions are in the space of every element, on curved (isoparametric) cells too: {LEFT}.",
-            source="The patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
+            source="Patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
         )
         for element, degree in ELEMENT_AND_DEGREE
     ),
@@ -109,13 +109,13 @@ ENTRIES = (
         given={"material": NEO, "element": "P2/P1", "faces": ENDS},
         negative_control="One end is turned 1 % further.",
         within=1e-14,
-        because="A turn stores nothing. Of mu/2 (I1 - 3) rounding is left: mu/2 I1 of the whole block is 0.14 N mm, its last digit "
-        "3e-17, and I1 and the sum over the block take some hundred operations.",
+        because="A rotation stores no energy; the rounding of mu/2 (I1 - 3) remains: mu/2 I1 of the whole block is 0.14 N mm, its "
+        "last digit 3e-17, and I1 and the sum over the block take some hundred operations.",
     ),
     replace(
         BLOCK,
         name="turned_muscle",
-        title="Contracting block whose ends are turned by 1 rad: largest difference to itself turned",
+        title="Contracting block whose ends are turned by 1 rad about an oblique axis: largest error of a node",
         given={"material": NEO + active(0.03), "element": "P2/P1", "faces": ENDS},
         negative_control="One end is turned 1 % further.",
         because=f"Fibres turn with the body: {LEFT}.",

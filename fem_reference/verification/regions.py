@@ -1,4 +1,4 @@
-"""Regions: a bar of two materials in series, one a thousand times as stiff, with a border on faces of cells or a transition."""
+"""Regions: a bar of two materials in series, one a thousand times as stiff, with an interface on cell faces or a transition."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,9 +15,9 @@ from fem_reference.verification.homogeneous import stretched
 from fem_reference.verification.parts import control, find, resistance, sliding
 
 series = find("series")
-SIZE, LONGER = (10.0, 2.0, 2.0), 1.2  # mm; the bar is stretched to so many times its length, and keeps its section
-MU, BULK, RATIO = 0.01, 0.1, 1000.0  # MPa; of the soft material
-STIFF, WIDTH = 4.0, 2.0  # mm
+SIZE, LONGER = (10.0, 2.0, 2.0), 1.2  # [mm], and the stretch; the cross-section is kept
+MU, BULK, RATIO = 0.01, 0.1, 1000.0  # [MPa] of the soft material, and the ratio of the stiffnesses
+STIFF, WIDTH = 4.0, 2.0  # length of the stiff part and width of the transition [mm]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Below:
 
 
 def bar(element: str, cells: int, width: float, stiff: float = STIFF) -> Body:
-    """The bar with a number of ``cells`` along it, of which the first ``stiff`` mm are a thousand times as stiff."""
+    """The bar in ``cells`` along its length, its first ``stiff`` mm a thousand times as stiff as the rest."""
     mesh, laws = shapes.box((cells, 1, 1), SIZE, ELEMENTS[element][0]), []
     for region, factor in (("tendon", RATIO), ("not tendon", 1.0)):
         laws.append(make("neo_hooke", mu=factor * MU, **{"in": region}))
@@ -48,7 +48,7 @@ def force(lab: Lab, cells: int, element: str, width: float, stiff: float = STIFF
 
 
 def truth(width: float) -> float:
-    """The force by the closed form."""
+    """The force [N] of the closed form."""
     return float(series.stress(MU, BULK, RATIO, (STIFF, width, SIZE[0]), LONGER * SIZE[0])) * SIZE[1] * SIZE[2]
 
 
@@ -59,11 +59,11 @@ ALIGNED = Entry(
     unit="N",
     measure=force,
     given={"cells": 10, "element": "P2", "width": 0.0},
-    **control("The stiff part is a cell longer.", stiff=STIFF + 1),
+    **control("The stiff part is longer by one cell.", stiff=STIFF + 1),
     truth=partial(truth, 0.0),
     relative=True,
     within=1e-10,
-    because="Displacements linear in each part are in the space: Newton's residual of 1e-11 N is left, beside 0.15 N.",
+    because="The element represents displacements that are linear in each part: Newton's residual of 1e-11 N remains, of 0.15 N.",
     kind="closed form",
     source="Equal nominal stress in both parts (validation/series.py).",
 )
@@ -76,8 +76,8 @@ ENTRIES = (
         title="Bar of two materials in series, one a thousand times as stiff, with a border on faces of cells, by P2/P1: force",
         given={"cells": 10, "element": "P2/P1", "width": 0.0},
         within=1e-6,
-        because="The pressure jumps at the border, which a continuous one cannot: it oscillates in the cells next to it. The stiff "
-        "ones hardly deform whatever it is; a share of about 1 / ratio^2 is left.",
+        because="The exact pressure jumps at the interface, the discrete one is continuous and oscillates in the cells next to it. "
+        "The stiff cells hardly deform under any pressure; a relative error of about 1 / ratio^2 remains.",
     ),
     replace(
         ALIGNED,
@@ -87,7 +87,7 @@ ENTRIES = (
         **control("No transition.", width=0.0),
         truth=partial(truth, WIDTH),
         within=5e-5,
-        because="The energy, and with it the force, is of fourth order in the size of quadratic cells, 0.25 mm at last.",
+        because="The energy, and with it the force, converges at order 4 with quadratic cells, of 0.25 mm in the finest mesh.",
         refinement=Refinement((10, 20, 40), SIZE[0], 4.0),
     ),
 )

@@ -1,4 +1,4 @@
-"""The rim of a clamped area, where displacement varies as the square root of the distance: the order at which the error falls.
+"""The rim of a clamped area, near which the displacement varies as the square root of the distance: the order of convergence.
 
 Half of the bottom of a block is clamped, so that a clamped face and a free one meet at 180 degrees. The side beyond the free half
 is pulled along the bottom, by a load so small that strains are about a hundredth. The opposite side slides on a plane, so that its
@@ -23,7 +23,7 @@ UNIFORM, GRADED = 1.0, 0.5  # m of h ~ r^(1 - m); 1: not graded
 
 
 def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
-    """Points (n, 3) [mm] of a half of the block from those of the unit cube, crowded towards the rim x = z = 0 where ``grading`` is
+    """Points (n, 3) [mm] of a half of the block from those of the unit cube, refined towards the rim x = z = 0 where ``grading`` is
     below 1.
     """
     x = unit[:, 0] if sign > 0 else 1 - unit[:, 0]
@@ -41,7 +41,7 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
 
 
 def body(level: int, grading: float, *, plane: bool) -> Body:
-    """A slice in a ``plane`` strain, of 4 cells to a side, or a block with free ends, of 3; and more by factors of two."""
+    """A slice in ``plane`` strain, with 4 cells a side, or a block with free ends, with 3; each ``level`` doubles them."""
     n = (4 if plane else 3) * 2**level
     acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
     fixed = (*clamped("clamped"), *sliding("x0", *(("y0", "y1") if plane else ())))
@@ -49,7 +49,7 @@ def body(level: int, grading: float, *, plane: bool) -> Body:
 
 
 def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
-    """The order of the clamped half's force [N], from the differences of three levels: no truth of the force is needed."""
+    """The order of convergence of the force on the clamped half, from three levels: no true value of the force is needed."""
     bodies, settings = [body(level, grading, plane=plane) for level in range(3)], {"first_step": 1.0, "residual": 1e-13}
     values = [float(lab.solve(one, ELEMENT, **settings).last.forces["clamped"][0]) for one in bodies]
     first, second = abs(values[1] - values[0]), abs(values[2] - values[1])
@@ -61,11 +61,11 @@ CONTROLS = {
     UNIFORM: control("graded towards the rim", grading=GRADED),
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
-PLANE = "the coarsest of three meshes has 4 cells to a side: over two finer ones it is"
-ON_PLANE = "A patch clamped in plane strain: order of its force, uniform quadratic hexahedra"
-ON_BLOCK = "A patch clamped on a block that is free at its ends: order of its force, uniform quadratic hexahedra"
-GRADED_TOO = "The same on meshes graded towards the rim"
-SPACE = "the coarsest of three meshes has 3 cells to a side, and one along the rim, whose ends add their own error"
+PLANE = "the coarsest of the three meshes has 4 cells a side; on finer meshes the order is"
+ON_PLANE = "A clamped patch in plane strain: order of convergence of its force, uniform quadratic hexahedra"
+ON_BLOCK = "A clamped patch on a block with free ends: order of convergence of its force, uniform quadratic hexahedra"
+GRADED_TOO = "The same, on meshes graded towards the rim"
+SPACE = "the coarsest of three meshes has 3 cells a side, and one along the rim, whose ends add an error of their own"
 
 ENTRIES = tuple(
     Entry(
@@ -83,8 +83,8 @@ ENTRIES = tuple(
         source="validation/rims.py: Williams 1952",
     )
     for name, grading, within, title, because in (
-        ("rim_plane", UNIFORM, 0.1, ON_PLANE, f"{PLANE} 0.006 nearer"),
-        ("rim_plane_graded", GRADED, 0.2, f"{GRADED_TOO}, h ~ r^(1/2)", f"{PLANE} 0.1 nearer"),
+        ("rim_plane", UNIFORM, 0.1, ON_PLANE, f"{PLANE} 0.006 closer"),
+        ("rim_plane_graded", GRADED, 0.2, f"{GRADED_TOO}, h ~ r^(1/2)", f"{PLANE} 0.1 closer"),
         ("rim_block", UNIFORM, 0.2, ON_BLOCK, SPACE),
         ("rim_block_graded", GRADED, 0.4, GRADED_TOO, SPACE),
     )

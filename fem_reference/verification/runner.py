@@ -23,7 +23,7 @@ from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
 
-# What fails one entry and lets the others go on; anything else is a mistake of ours, or the wish to stop.
+# Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
 
 
@@ -46,7 +46,7 @@ def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
 
 def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
     """The names of the ``wanted`` entries, in the order of the catalogue: names of entries or groups, or shell
-    patterns of them. InputError naming ``place`` where one means none.
+    patterns of them. InputError naming ``place`` where one matches nothing.
     """
     chosen: set[str] = set()
     for text in wanted:
@@ -58,7 +58,7 @@ def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tu
 
 
 def _known(catalogue: dict[str, Entry], text: str) -> str:
-    """The entries that could have been meant by ``text``: the names closest to it, and every group."""
+    """The entries that ``text`` may have meant: the names closest to it, and every group."""
     groups = dict.fromkeys(entry.group for entry in catalogue.values())
     near = get_close_matches(text, catalogue, n=5)
     such = f" (such as {', '.join(near)})" if near else ""
@@ -73,7 +73,7 @@ def run(
     """The results of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
     negative control.
 
-    Two at a time where there are two cores, each thread with a lab of its own. However this ends, its labs are closed.
+    Two run at a time where there are two cores, each thread with a lab of its own. The labs are closed even after an error.
     """
     begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)
     free = SimpleQueue[Lab]()
@@ -98,7 +98,7 @@ def run(
 
 
 def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
-    """The result of an entry; where it raised, a finding or a truth that is not a number, and a note that says why."""
+    """The result of an entry; if it raised an error, its value or truth is NaN and its note says why."""
     begin = time.perf_counter()
     try:
         finding = entry.find(lab, with_negative_control=with_negative_control)

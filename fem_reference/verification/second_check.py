@@ -1,4 +1,4 @@
-"""The second check of runs that a solver calls converged: a correct run passes, and each kind of mistake denies it."""
+"""The second check of runs that a solver reports as converged: a correct run passes, and each kind of mistake is rejected."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,7 +30,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
 
 
 def bar(ball: str = "2 mm") -> MuscleProblem:
-    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a ball of 3 mm is pressed into it by ``ball``."""
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a ball of radius 3 mm moves by ``ball`` into it."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
     table = {
@@ -52,7 +52,7 @@ _SOLVED = WeakKeyDictionary[Lab, tuple[MuscleProblem, Run]]()
 
 
 def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
-    """The bar as a muscle, and its run, which a lab makes once."""
+    """The bar as a muscle problem, and its run, which is solved once for each lab."""
     if lab in _SOLVED:
         return _SOLVED[lab]
     problem = bar()
@@ -67,19 +67,19 @@ def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
 
 
 def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
-    """The number of checks that are not met by the run, or by one with a deliberate mistake."""
+    """The number of checks that the run, or the run with a deliberate mistake, fails."""
     problem, run = solved(lab)
     lost = [str(one) for one in of_muscle(*(mistake(problem, run) if mistake else (problem, run))) if not one.met]
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
 def missing(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
-    """The last frame missing."""
+    """The run without its last frame."""
     return problem, replace(run, positions=run.positions[:2], numbers=run.numbers[:2])
 
 
 def moved(frame: int, place: Vector, by: Vector) -> Mistake:
-    """A mistake: in a frame, the vertex that is at ``place`` at rest is moved ``by`` so much [mm]."""
+    """A mistake: in one frame, the vertex that is at ``place`` at rest is displaced ``by`` a vector [mm]."""
 
     def mistake(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
         positions = run.positions.copy()
@@ -94,13 +94,13 @@ MISTAKES = (
     ("frames", "its last frame missing", missing),
     ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
     ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
-    ("bone", "the ball 3 mm farther, within the bar", lambda it, run: (replace(it, bones=bar("5 mm").bones), run)),
+    ("bone", "the ball 3 mm deeper in the bar", lambda it, run: (replace(it, bones=bar("5 mm").bones), run)),
     ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
 )
 
 
 def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
-    """The number of checks that are not met by two blocks pressed together, the side of one then moved ``farther`` [mm] into the
+    """The number of checks that two blocks pressed together fail, after the face of one is moved ``farther`` [mm] into the
     other.
     """
     body = pressed_blocks(BLOCK_STIFFNESS)
@@ -113,7 +113,7 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
 
 
 def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
-    """The number of balances that the pressed blocks do not meet, where a share of the force that moves them is ``lost``."""
+    """The number of balance checks that the pressed blocks fail, with a share ``lost`` of the force that moves them."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}
@@ -127,14 +127,14 @@ def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **
     return Entry(
         name=f"second_check_{name}",
         group="second check",
-        title=f"A run of {what} passes the second check; not with {words}",
+        title=f"A run of {what} passes the second check; it fails with {words}",
         unit="1",
         measure=measure,
         given={},
         **control(words, **mistake),
         truth=0.0,
         within=0.5,
-        because="it counts the checks that are not met",
+        because="the value is a whole number, that of failed checks",
         kind="property",
         source="fem_reference/assessment/run_checks.py",
     )
@@ -144,6 +144,6 @@ BAR = "a bar between two bones, into which a ball is pressed,"
 BLOCKS = "two blocks pressed together"
 ENTRIES = (
     *(_entry(name, BAR, words, denials, mistake=mistake) for name, words, mistake in MISTAKES),
-    _entry("touching", BLOCKS, "the side of one 0.1 mm farther in the other", touching_denials, farther=0.1),
-    _entry("balance", BLOCKS, "a thousandth of one recorded force lost", unbalanced, lost=1e-3),
+    _entry("touching", BLOCKS, "the face of one 0.1 mm deeper in the other", touching_denials, farther=0.1),
+    _entry("balance", BLOCKS, "one recorded force too small by a thousandth", unbalanced, lost=1e-3),
 )

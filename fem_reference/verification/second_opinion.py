@@ -1,8 +1,8 @@
-"""The same bodies by other solvers: by scikit-fem, and by each linear solver of FEniCSx, which must not change the answer.
+"""The same bodies solved by scikit-fem, and with each linear solver of FEniCSx, which must not change the solution.
 
-FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Both discretise alike, so that their states differ
-by Newton's residual and, where a rule cannot integrate an energy exactly, by their rules: Gauss-Legendre in hexahedra for both,
-but other points in tetrahedra, where a higher degree brings them together.
+FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same, so that their
+states differ by Newton's residual and, where quadrature is not exact, by their rules: both use Gauss-Legendre in hexahedra, but
+different points in tetrahedra, where the difference vanishes with the degree of the rules.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ from fem_reference.verification.patch import patch
 
 
 def stiffer(body: Body, error: float) -> Body:
-    """``body`` with an ``error`` of the first parameter of its first effect, a modulus, relative."""
+    """``body`` with a relative ``error`` in the first parameter of its first effect, a modulus."""
     first, *others = body.effects
     name, value, _ = first.parameters[0]
     return replace(body, effects=(first.model_copy(update={name: value * (1 + error)}), *others))
@@ -38,7 +38,7 @@ def agreement(
 ) -> Finding:
     """The largest of the relative differences of :func:`differences`.
 
-    ``residual`` [N, mm3]; ``quadrature``: the degree of both, None that of each solver; ``error``: of a modulus of the second.
+    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, None: each solver's own; ``error``: of a modulus in scikit-fem.
     """
     settings: dict[str, float] = {"first_step": 0.5, "residual": residual}
     if quadrature is not None:
@@ -53,7 +53,7 @@ def agreement(
 
 def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
     """The relative differences between two states of a body: of node positions over the greatest displacement from ``rest`` (n, 3),
-    of energies, and of forces and moments over their greatest.
+    of energies, and of forces and moments over the greatest of them.
     """
     return {
         "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
@@ -71,17 +71,17 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
 def built(
     acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
 ) -> Body:
-    """A body of the ``acting`` effects and a resistance to volume change; ``mesh`` by kind of its cells."""
+    """A body with the ``acting`` effects and a resistance to volume change; ``mesh`` makes its cells from their kind."""
     acting = (*acting, parts.resistance(element, 1.0))
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
 
-# [N, mm3] that ends Newton's method; the softest motion of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
+# [N, mm3] that ends Newton's method; the softest mode of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
 RESIDUAL = 1e-11
 
 
 def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) -> Floats:
-    """A bar of muscle, one end clamped, the other turned by 1 rad about an oblique axis: its nodes (n, 3) [mm]."""
+    """A bar of muscle, one end clamped, the other turned by 1 rad about an oblique axis: its deformed nodes (n, 3) [mm]."""
     mesh = shapes.box((3, 3, 7), (10.0, 10.0, 25.0), "tetrahedron")
     passive = make("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4)
     turned = Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5)))
@@ -92,7 +92,7 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
-    """The largest distance [mm] of a node from its place by the direct solver in double precision."""
+    """The largest distance [mm] of a node from where the direct solver in double precision puts it."""
     return parts.farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 
@@ -112,7 +112,7 @@ BAR = partial(shapes.box, (2, 2, 4), (1.0, 1.0, 2.0))
 SHORT_BAR = partial(shapes.box, (1, 1, 2), (1.0, 1.0, 2.0))
 BLOCK = partial(shapes.warped_box, (2, 2, 2), (1.0, 1.0, 1.0))
 CURVED_BLOCK = partial(BLOCK, degree=2)
-# Bends and twists at once: an axis between that of the bar, z, and one across it.
+# An axis between that of the bar, z, and one across it: the turn bends and twists at once.
 TURNED = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))))
 STANDING = (*parts.clamped("z0"), Prescribed("y0", "y0", (1,), Rest(), stiffness=0.01))
 PULLED = (*parts.SYMMETRY, Prescribed("z1", "z1", (2,), Affine(parts.NO_GRADIENT, (0.0, 0.0, 0.6))))
@@ -122,18 +122,17 @@ ALIKE = "both integrate by the same Gauss-Legendre rule, so that"
 SAME_RULE = f"{ALIKE} {REMAINS}"
 CONSTANT = f"F is constant in a cell, so that every rule is exact: {REMAINS}"
 BAR_RULES = (
-    "they integrate by different rules, here of degree 9; by P2/P1 this bar differs by 3e-6 with those of degree 4, 3e-7 with 6, "
-    "1e-9 with 8 and 2e-11 with 9"
+    "their quadrature rules differ, here of degree 9; with P2/P1 this bar differs by 3e-6 at degree 4, 3e-7 at 6, "
+    "1e-9 at 8 and 2e-11 at 9"
 )
 BLOCK_RULES = (
-    "they integrate by different rules, here of degree 9; this block differs by 4e-6 with those of degree 4, 1e-11 with 8 and "
-    "4e-14 with 9"
+    "their quadrature rules differ, here of degree 9; this block differs by 4e-6 at degree 4, 1e-11 at 8 and 4e-14 at 9"
 )
 
 
 class Tolerance(NamedTuple):
-    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of the degree ``quadrature``, None: each
-    solver's own.
+    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of degree ``quadrature``, None: each solver's
+    own.
     """
 
     within: float
@@ -158,16 +157,16 @@ STEEPER = Tolerance(
     "F is constant, so that every rule is exact: Newton's residual of 1e-13 N, at forces of 0.01 to 3 N, and rounding remain",
 )
 BENT = "bent and twisted at once"
-LEANING = "under its weight and a fluid that presses on one side, leaning on springs"
+LEANING = "under its weight and a fluid pressure on one side, supported by springs"
 BY_GAUSS = Tolerance(1e-9, f"{ALIKE} Newton's residual of 1e-8 N, at forces of 50 N, remains", 1e-8, 5)
 
 
 def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
-    """An entry of a body that is solved twice."""
+    """An entry for a body that both solvers solve."""
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
-        title=f"{title}, by {element}: how far FEniCSx and scikit-fem differ",
+        title=f"{title}, by {element}: largest relative difference of FEniCSx and scikit-fem",
         unit="1",
         measure=agreement,
         given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
@@ -176,7 +175,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, toler
         within=tolerance.within,
         because=tolerance.because,
         kind="second solver",
-        source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",
+        source="elements of scikit-fem; derivatives by jets, our own assembly and Newton's method, scipy's sparse LU",
     )
 
 
@@ -194,7 +193,7 @@ BENT_P1 = f"A neo-Hookean bar with a penalty on its volume, {BENT}"
 BENT_P1P1 = f"A bar of muscle whose linear pressure is stabilised, {BENT}"
 BENT_GUCCIONE = f"A bar of Guccione's heart muscle with a penalty on its volume, {BENT}"
 BENT_FAMILIES = f"A bar with two families of fibres and a penalty on its volume, {BENT}"
-BENT_TAUT = f"A bar with FEBio's fibres, which are taut at rest and pull, {BENT}"
+BENT_TAUT = f"A bar with FEBio's fibres, which are prestretched and contract, {BENT}"
 PULLED_BLOCK = partial(built, (MOONEY_RIVLIN,), SHORT_BAR, PULLED, "P2/P1")
 PATCH = "A patch of curved cells that is stretched, sheared and turned at once"
 COOK = "Cook's membrane in 4 by 4 cells at a quarter of the load"
@@ -210,21 +209,21 @@ LAGGED = Entry(
     **parts.control("Newton's method ends at a residual of 1e-2 N.", residual=1e-2),
     truth=0.0,
     within=1e-9,
-    because="Both end where the residual is below 1e-11 N, far below it as a rule; where the bar is softest (some 0.006 N/mm) that "
-    "would leave 2e-9 mm.",
+    because="Both end at a residual below 1e-11 N, as a rule far below; in the softest mode of the bar (about 0.006 N/mm) 1e-11 N "
+    "is an error of 2e-9 mm.",
     kind="property",
-    source="The solution of an equation does not depend on how it was found.",
+    source="The solution of the equations does not depend on the linear solver.",
 )
 
 ENTRIES: tuple[Entry, ...] = (
     specimen("uniaxial", "with passive fibres, stretched along them", fibres.muscle(fibres.passive(), 1.6)),
-    specimen("equibiaxial", "with two families of fibres, stretched alike along two axes", FAMILIES),
+    specimen("equibiaxial", "with two families of fibres, stretched equally along two axes", FAMILIES),
     specimen("planar", "of Mooney-Rivlin material, shortened with its width fixed", SHORTENED),
     specimen("simple_shear", "of Guccione's heart muscle in simple shear", SHEARED),
-    specimen("pulled", "with active fibres, pulled by a dead force", ACTIVE_BLOCK),
+    specimen("pulled", "with active fibres, pulled by a dead load", ACTIVE_BLOCK),
     specimen("febio", "with FEBio's fibres, stretched along them", fibres.muscle(fibres.passive_febio(), 1.6)),
-    specimen("tension", "with fibres of constant tension, fixed short", fibres.muscle(fibres.tension(), 0.9)),
-    specimen("taut", "of prestretched muscle, fixed", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
+    specimen("tension", "with fibres of constant tension, shortened to 0.9", fibres.muscle(fibres.tension(), 0.9)),
+    specimen("taut", "of prestretched muscle, held at its length", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
     specimen("neo_hooke", "of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
     opinion("patch", PATCH, partial(patch, "Q2/Q1", 2), "Q2/Q1", STEEPER),
     opinion("cook", COOK, partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4), "Q2/Q1", BY_GAUSS),

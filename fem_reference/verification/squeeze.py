@@ -1,14 +1,14 @@
-"""A block squeezed between plates: smooth ones, to a tenth of its height and back or until it collapses, and glued ones, until its
-corners fold over.
+"""A block squeezed between plates: smooth ones, to a tenth of its height and back or until it collapses, and ones it sticks to,
+until its corners fold over.
 
-Smooth plates leave every state homogeneous, even below half the height, where it is unstable: Newton's method follows it, as a
-structured mesh does not disturb it. On the return path a load step that is too large finds another state without stress: the
-block turned by half a turn, through its planes of symmetry. That state is refused, as det F falls to 0 on the straight line to it.
+Between smooth plates every state is homogeneous. Below half the height that state is unstable, but Newton's method follows it, as a
+structured mesh does not disturb it. On the return path too large a load step finds another stress-free state, the block turned by
+half a turn through its planes of symmetry. It is refused, as det F falls to 0 on the straight line to it.
 
-Where the bulk modulus is low, no state near the rest volume is left at some height. An isochoric neo-Hookean energy pulls at the
-volume, which the law ``K/2 (J - 1)^2`` cannot keep: its pressure is K at most. Free at its sides the block is in balance where
-``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. But for ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
-right side is 0.326 K at most, at J = 2/5. Below a stretch of some mu/K the only state left is near ``J = stretch^3``: a block that
+Where the bulk modulus is low, there is a height below which no state near the rest volume exists. The isochoric neo-Hookean energy
+favours a smaller volume, which the law ``K/2 (J - 1)^2`` cannot prevent: its pressure is K at most. With free sides the equilibrium
+is ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. Without ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
+right side is 0.326 K at most, at J = 2/5. Below a stretch of about mu/K the only state is near ``J = stretch^3``: a block that
 has shrunk equally along all axes, without shear and without force on the plate.
 """
 
@@ -24,12 +24,12 @@ from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, con
 
 loads = find("loads")
 MU = 0.01  # [MPa]
-HEIGHT = 0.1  # of the squeezed block over that at rest: one that collapses has a thousandth of its volume there
+HEIGHT = 0.1  # of the squeezed block over that at rest; a collapsed block has a thousandth of its rest volume there
 STEPS = 5  # in each direction
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
 POISSON = 0.3  # of a block that collapses
-# On the branch of states near rest, which falls steeply here: from 0.59 of the volume to 0.42.
+# On the branch of states that begins at rest, on which the volume falls steeply here: from 0.59 of that at rest to 0.42.
 STRETCHES = (1.0, 0.8, 0.6, 0.5, 0.45, 0.43, 0.425, 0.42, 0.415, 0.41, 0.405, 0.4)
 LOWEST = 0.5  # V/V0 of the range of the law
 
@@ -47,11 +47,11 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of the block on the path down and on a share ``back`` of the return: at even steps, or where they are
-    ``growing`` at the ends of both paths.
+    """All states of the block on the path down and on a share ``back`` of the return: at even load steps, or, where the steps are
+    ``growing``, at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
-    # Every state by Newton's method, those of the return path too.
+    # Newton's method solves for every state, on the return path too.
     solved = plated(lab, element, bulk, path, frames(2, 2 if growing else 2 * STEPS), first_step=0.05, reuse=False)
     return (*solved.states[:-1], solved.last)
 
@@ -90,8 +90,8 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
 
 
 def collapses(lab: Lab, element: str, poisson: float) -> Finding:
-    """1 where the squeeze does not reach its end, keeps no state below a fifth of its volume, and names the law outside its range;
-    else 0. Newton's method finds a collapsed state or, on the steep branch towards it, which folds back, none.
+    """1 if the squeeze stops before its end, keeps no state below a fifth of the volume, and names the law outside its range; else
+    0. Newton's method finds a collapsed state or, as the steep branch towards it folds back, none.
     """
     solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
@@ -125,38 +125,38 @@ def _end_note(solved: Run, height: float) -> str:
 
 
 def inverts(lab: Lab, element: str, count: int, height: float) -> Finding:
-    """1 where the squeeze ends as inverted in a state that Newton's method accepts, else 0."""
+    """1 if the squeeze ends with the status "inverted" in a state at which Newton's method converged, else 0."""
     solved = glued(lab, element, count, height)
     found = solved.outcome.status == "inverted" and "Newton's method converged" in solved.outcome.message
     return Finding(float(found), note=_end_note(solved, height))
 
 
 def stays_upright(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Finding:
-    """1 where the squeeze ends with det F above zero at every checked point, else 0."""
+    """1 if the squeeze reaches its end with det F above zero at every checked point, else 0."""
     solved = glued(lab, element, count, height, **settings)
     scalars = solved.states[-1].scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
     return Finding(float(solved.outcome.status == "converged" and smallest > 0), note=_end_note(solved, height))
 
 
-EXACT = "the state is homogeneous, so that every element has it: Newton's residual of 1e-11 N and rounding remain"
+EXACT = "the state is homogeneous and every element represents it: Newton's residual of 1e-11 N and rounding remain"
 BALANCE = "validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)"
-# A property that is there (1) or not (0).
+# A property that holds (1) or does not (0).
 YES = partial(Entry, unit="1", truth=1.0, within=0.1, because="the answer is yes (1) or no (0)", kind="property")
 EXACTLY = partial(Entry, group="squeeze", within=1e-10, because=EXACT, kind="closed form", source=BALANCE)
 SMOOTH = partial(EXACTLY, negative_control="bulk modulus 1 % too small")
-UPRIGHT = "det F above zero everywhere, or material would go through itself"
+UPRIGHT = "det F must be above zero everywhere, or the material would pass through itself"
 GLUED = partial(YES, group="squeeze", source=UPRIGHT)
 
 ENTRIES: tuple[Entry, ...] = (
     YES(
         name="collapse_is_no_result",
         group="collapse",
-        title="Squeezed to a tenth of its height, a block of the Poisson ratio 0.3 is no result, and its law is named, by P2/P1",
+        title="A block of Poisson's ratio 0.3 squeezed to a tenth of its height: the run is rejected and its law named, by P2/P1",
         measure=collapses,
         given={"element": "P2/P1", "poisson": POISSON},
-        **control("a Poisson ratio of 0.499, with which 0.993 of the volume are kept", poisson=0.499),
-        source="validation/loads.py: the only state in balance has a thousandth of the volume, which no flesh has",
+        **control("a Poisson ratio of 0.499, which keeps 0.993 of the volume", poisson=0.499),
+        source="validation/loads.py: the only equilibrium has a thousandth of the volume, which is impossible for tissue",
     ),
     Entry(
         name="law_outside_its_range",
@@ -168,7 +168,7 @@ ENTRIES: tuple[Entry, ...] = (
         **control("a Poisson ratio of 0.32", poisson=0.32),  # with which the volume stays above a half
         truth=lambda: sum(loads.squeezed_volume(MU, bulk_modulus(POISSON), at) < LOWEST for at in STRETCHES),
         within=0.1,
-        because="it is a number of states, each of them homogeneous, so that every element has it",
+        because="the value is a number of states, each homogeneous, so that every element represents it exactly",
         kind="closed form",
         source=BALANCE,
     ),
@@ -202,11 +202,11 @@ ENTRIES: tuple[Entry, ...] = (
             unit="mm",
             measure=distance_from_rest,
             given={"element": element, "bulk": bulk, "growing": growing},
-            **control("the plates stop a thousandth of their way before they are back", back=0.999),
+            **control("the plates stop short of their return by a thousandth of the way", back=0.999),
             truth=0.0,
-            because=f"{EXACT}; an elastic body keeps no trace of the squeeze",
+            because=f"{EXACT}; an elastic body recovers completely",
             kind="property",
-            source="a hyperelastic body that nothing loads or moves is at rest",
+            source="an unloaded, unconstrained hyperelastic body returns to rest",
         )
         for name, element, bulk, growing in (
             ("k1e3", "Q2/Q1", 10.0, False),
@@ -220,7 +220,7 @@ ENTRIES: tuple[Entry, ...] = (
         measure=inverts,
         given={"element": "Q1/P0", "count": 4, "height": GLUED_TO},
         **control("squeezed to 0.7 of its height only", height=0.7),
-        source=f"{UPRIGHT}; Newton's method does not see it at a vertex",
+        source=f"{UPRIGHT}; Newton's method does not notice an inverted vertex",
     ),
     GLUED(
         name="bonded_squeeze_stays_upright",
@@ -234,6 +234,6 @@ ENTRIES: tuple[Entry, ...] = (
         title="Squeezed to 0.4 of its height between plates that it sticks to, P2/P1 keeps det F above zero everywhere",
         measure=stays_upright,
         given={"element": "P2/P1", "count": 2, "height": GLUED_TO},
-        **control("a rule of quadrature of degree 4, which has no points at the vertices", quadrature_degree=4),
+        **control("a quadrature rule of degree 4, which has no points at the vertices", quadrature_degree=4),
     ),
 )

@@ -1,4 +1,4 @@
-"""Contact of deformable bodies: two blocks with unrelated meshes, and a ball on a large body, both elastic (Hertz)."""
+"""Contact of deformable bodies: two blocks with non-matching meshes, and a ball on a large body, both elastic (Hertz)."""
 
 import math
 from dataclasses import replace
@@ -28,13 +28,13 @@ from fem_reference.verification.contact import (
 )
 from fem_reference.verification.parts import NO_GRADIENT, clamped, control, find, neo_hooke
 
-SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], and [MPa/mm]
+SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], contact stiffness [MPa/mm]
 SMOOTHING = 0.002  # [mm]
 BALL_STIFFNESS, FLAT = 2.0, 2.0  # [MPa/mm], and the distance [mm] at which the ball's curvature ends
 
 
 def _mirrors(*pieces: str) -> tuple[Prescribed, ...]:
-    """The planes x = 0 and y = 0 of all ``pieces`` as mirrors."""
+    """The planes x = 0 and y = 0 of all ``pieces`` as symmetry planes."""
     named = [(f"{piece}_{axis}0", i) for piece in pieces for i, axis in enumerate("xy")]
     return tuple(one for name, axis in named for one in clamped(name, components=(axis,)))
 
@@ -44,7 +44,7 @@ def _lowered(name: str, path: float, components: tuple[int, ...]) -> Prescribed:
 
 
 def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
-    """Two blocks with unrelated meshes, ``apart`` [mm] at rest, as high as wide together; the upper one is moved down."""
+    """Two blocks with non-matching meshes, ``apart`` [mm] at rest, together as high as they are wide; the upper one moves down."""
     low, high = (shapes.box(counts, (1.0, 1.0, 0.5), "tetrahedron") for counts in ((3, 3, 2), (4, 5, 2)))
     mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0, 0, 0.5 + apart])})
     moved = _lowered("high_z1", TRAVEL + apart, (2,))
@@ -54,7 +54,7 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 
 
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
-    """The force [N] between the pressed blocks; their faces are two parts, or one that touches ``itself``."""
+    """The force [N] between the pressed blocks; their faces are two surfaces, or one that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
     if itself:  # the blocks then begin beyond the smoothing, without pressure at rest
         (law,), facets = body.touching, body.mesh.facets
@@ -67,7 +67,7 @@ def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
 
 
 def _quarter(n: int) -> Cells:
-    """A quarter of a large body, z >= 0, of cells that grow from ``n`` in its core; its region "near" is the middle of z0."""
+    """A quarter of a large body, z >= 0, ``n`` cells in its core, larger ones outside; its region "near" is the middle of z0."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     flat = mesh.facets["z0"]
     near = np.linalg.norm(mesh.points[flat][..., :2], axis=2).max(axis=1) < FLAT
@@ -75,8 +75,8 @@ def _quarter(n: int) -> Cells:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a flat body below z = 0, and of one above, with a bump of a ``radius`` [mm] where it touches the other, whose
-    far ends approach each other by APPROACH.
+    """A quarter of a flat body below z = 0, and of one above, with a bump of a ``radius`` [mm] where they touch; their far ends
+    approach each other by APPROACH.
     """
     low, high = _quarter(n), _quarter(n + 1)
     away = np.hypot(high.points[:, 0], high.points[:, 1])
@@ -107,7 +107,7 @@ def known_ball(name: str) -> float:
     """The closed form for an elastic ball on a body of the same material."""
     hertz = find("hertz")
     flat, round_ = (hertz.Side(radius, YOUNG, POISSON) for radius in (math.inf, RADIUS))
-    # Two compliances of the same size: half the force of a rigid ball at the same approach.
+    # Two equal compliances in series: half the force of a rigid ball at the same approach.
     return float(getattr(hertz.Hertz(flat, round_, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH) / 2), name))
 
 
@@ -115,24 +115,24 @@ ENTRIES = (
     *(
         CONTACT(
             name=name,
-            title=f"Two blocks with unrelated meshes pressed together{words}: their force",
+            title=f"Two blocks with non-matching meshes pressed together{words}: the contact force",
             unit="N",
             measure=partial(blocks, itself=bool(words)),
             given={"stiffness": BLOCK_STIFFNESS},
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
             truth=partial(in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
-            because="points of either mesh do not integrate the other's functions exactly: 6e-5 remain, and 2 % of the pressure",
+            because="quadrature on one mesh is not exact for functions of the other: the force errs by 6e-5, the pressure by 2 %",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
-        for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one part that touches itself"))
+        for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one surface that touches itself"))
     ),
     *hertzian(
         "hertz_elastic_{}",
         "An elastic ball pressed against a large body of the same material: {}",
         ball,
         known_ball,
-        "the mesh and the overlap of both leave about 1 %, strains of a tenth and the end of the bodies less",
+        "discretisation and overlap add about 1 %, strains of 0.1 and the finite size of the bodies less",
         READINGS,
     ),
 )
