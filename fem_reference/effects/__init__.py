@@ -1,13 +1,13 @@
 """Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
-Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, and one expression written once,
-with operators and the functions of ``Functions`` only, so that a solver can use it symbolically and a test can evaluate it
-in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
-traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
+Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written only
+once and with nothing but operators and the functions of ``Functions``, so that a solver can use it symbolically and a test can
+evaluate it in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its
+surface (a traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
 ``FieldEffect`` acts on a scalar field psi and has a weak form.
 
-A solver may replace an effect's parameters by symbols, so that a compiled form serves every value of them: an expression
-never branches on a parameter and uses it with operators and ``state.functions`` only.
+A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values: an expression never
+branches on a parameter, and uses it with operators and ``state.functions`` only.
 """
 
 import importlib
@@ -37,11 +37,11 @@ __path__ += outside.folders()
 class Effect(Record):
     """A frozen record of the parameters of an effect on a body.
 
-    ``unknowns``: names of the fields that it adds; ``needs``: its requirements: of the rest state, ``"fibre"``; of the frames,
-    ``"interval"``, the time between frame numbers; of a step, ``"momentum"``, velocities and predicted displacements;
+    ``unknowns``: names of the fields that it adds; ``needs``: what it requires: ``"fibre"``, fibre directions at rest;
+    ``"interval"``, the time between frame numbers; ``"momentum"``, velocities and predicted displacements in a load step;
     ``outer``: True where it acts from outside the body, so that its forces do not balance by themselves; ``example``: some of its
-    parameters, as scene files write them, besides those of its kind; ``published``: by name the ranges of its parameters in the
-    literature of muscle.
+    parameters, as scene files write them, besides those of its kind; ``published``: by name, the ranges of its parameters in the
+    literature on muscle.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -55,7 +55,7 @@ class Effect(Record):
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
-        """The ranges of its validity; none unless its docstring states one."""
+        """The ranges in which it is valid; empty unless its docstring states one."""
         return ()
 
     def moduli(self) -> Moduli:
@@ -63,8 +63,8 @@ class Effect(Record):
         return Moduli()
 
     def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
-        """The force and moment of its full amount on a whole body of this ``shape``; None where they are unknown or depend on
-        more, such as velocities within a load step.
+        """The force and moment of its full amount on a whole body of this ``shape``; None where they are unknown or depend on more
+        than the shape, such as velocities within a load step.
         """
         return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
@@ -76,7 +76,7 @@ class Effect(Record):
 
     @property
     def title(self) -> str:
-        """Its name, with its part of the surface and its region, by which it is distinct from others of its kind in a scene."""
+        """Its name, with its part of the surface and its region, which distinguish it from others of its kind in a scene."""
         on = getattr(self, "on", "")
         return (
             type(self).__name__ + (f" on {on}" if on else "") + (f" in {region}" if (region := region_of(self)) else "")
@@ -108,7 +108,7 @@ class Ramped(Effect):
 
 class Energy(Effect):
     """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable. It acts everywhere, or in a
-    ``region`` of the body (``in``): by the share that a point has in it.
+    ``region`` of the body (``in``), in proportion to the share of a point in the region.
     """
 
     stored: ClassVar[bool] = True
@@ -126,7 +126,7 @@ class Energy(Effect):
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
     def weighted(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``, by the share of the point in its region."""
+        """Energy per rest volume [MPa] at ``state``, multiplied by the share of the point in the region."""
         return state.share(self.region) * self.energy(state) if self.region else self.energy(state)
 
 
@@ -136,13 +136,13 @@ def region_of(effect: Record) -> str:
 
 
 def regions_named(effects: Iterable[Record]) -> list[str]:
-    """The names of the regions in which ``effects`` act, or outside of which, each once."""
+    """The names of the regions in which ``effects`` act, or outside which they act, each once."""
     named = filter(None, map(region_of, effects))
     return list(dict.fromkeys(region.removeprefix(REST) for region in named))
 
 
 class VolumeLaw(Energy):
-    """An energy of the volume alone, of the bulk modulus ``bulk`` [MPa], whose range is V/V0 from 1/2 to 2."""
+    """An energy that depends on the volume alone, with the bulk modulus ``bulk`` [MPa]. It is valid for V/V0 from 1/2 to 2."""
 
     example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
     bulk: PositivePressure
@@ -171,14 +171,14 @@ class PassiveFibres(Energy):
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the greatest expected stretch, against the matrix."""
+        """The tension of the fibres at the greatest expected stretch, compared with the matrix."""
         greatest = scene.stretch[1]
         pull = fibre_tension(self.energy, greatest)
         return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
 class Load(Effect):
-    """A load on the part ``on`` of the surface. Where it is ``stored`` it has an energy per rest area, else a traction."""
+    """A load on the part ``on`` of the surface. If ``stored``, it has an energy per rest area, else a traction."""
 
     outer: ClassVar[bool] = True
     stored: ClassVar[bool] = False
@@ -195,7 +195,7 @@ class Load(Effect):
 
 
 class Interaction(Effect):
-    """An effect between a body and the bones around it, which a problem makes from a scene."""
+    """An effect between a body and bones or muscles around it, which a problem makes from a scene."""
 
 
 class Prestrain(Effect):
@@ -207,7 +207,7 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """``state`` with the F of the energies of ``acting``: with a prestrain, its elastic part."""
+    """``state`` with the F on which the energies of ``acting`` depend: its elastic part, if there is a prestrain."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
@@ -217,7 +217,7 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient. A prestrain changes F before the step as it does F now, so its own ramp causes no motion.
+    deformation gradient. A prestrain changes the F before the step as it changes the present F, so its own ramp causes no rate.
     """
     state = elastic_state(acting, state)
     return sum(law.weighted(replace(state, amount=amount)) for law, amount in acting if isinstance(law, Energy))
@@ -240,12 +240,12 @@ class FieldEffect(Record):
         return self.strong(psi, place) * test.value
 
     def strong(self, psi: FieldState, place: Place) -> Any:
-        """The term itself, as a residual-based stabilisation needs it."""
+        """The term in its strong form, as residual-based stabilisation needs it."""
         raise NotImplementedError(f"{type(self).__name__} has no strong form")
 
 
 def names(kind: type[Record] = Effect) -> list[str]:
-    """The existing effects of a ``kind``, by their names in scene files."""
+    """The names, in scene files, of the existing effects of a ``kind``."""
     return [name for name in modules.names(__path__) if issubclass(_record(name), kind)]
 
 
@@ -257,7 +257,7 @@ def find(name: str) -> type[Record]:
 
 
 def name_of(effect: Record | type[Record]) -> str:
-    """The name of an ``effect``, or of its kind, in scene files: that of its file."""
+    """The name of an ``effect``, or of its kind, in scene files, which is that of its file."""
     return effect.__module__.rpartition(".")[2]
 
 

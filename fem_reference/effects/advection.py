@@ -8,7 +8,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 class Advection(FieldEffect):
     """``v . grad psi``; on a surface only the part of v along it acts. Report eq. 4.4: ``B = v``.
 
-    ``velocity``: v, as many components as the domain has coordinates [length / time].
+    ``velocity``: v [length / time], with as many components as the domain has coordinates.
     """
 
     example: ClassVar[dict[str, Any]] = {"velocity": [1.0, -3.0]}

@@ -1,4 +1,4 @@
-"""Collagen across the fibres, in all directions of the plane perpendicular to them, under tension only where it is stretched."""
+"""Collagen across the fibres, in all directions of the plane perpendicular to them; it has no stiffness in compression."""
 
 from typing import Any, ClassVar
 
@@ -8,10 +8,10 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# The cosines of twice the angle, evenly over half a turn; as Python floats: numpy numbers would turn symbols into arrays.
+# The cosines of twice the angle, evenly over half a turn; Python floats, as numpy's would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
-# The square root has no slope at 0: this share of the squared mean is added to the squared spread.
+# The square root has no derivative at 0, so this share of the squared mean is added to the squared spread.
 _ROUNDING = 1e-13
 
 
@@ -19,12 +19,13 @@ class CollagenAcross(Energy):
     """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` while ``I = J^(-2/3) a . C a`` is
     above 1, else 0.
 
-    ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre I is ``mean + spread cos(2 angle)``, of which the mean is
-    half the trace of C there and ``mean^2 - spread^2`` its determinant; eight angles are summed.
+    ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``; the mean is half the
+    trace of C there, ``mean^2 - spread^2`` its determinant; eight angles are summed.
 
-    Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019,
-    doi 10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here only
-    over directions in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
+    Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019, doi
+    10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here the
+    directions are only those in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000, doi
+    10.1023/A:1010835316564.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

@@ -1,4 +1,4 @@
-"""Contact of bones with the muscle, with any sliding; attached parts and parts near to them are exempt."""
+"""Contact of bones with the muscle, with any amount of sliding; attached parts and the parts near them are exempt."""
 
 import math
 from collections.abc import Iterable
@@ -16,10 +16,10 @@ class Contact(Interaction):
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper, k the ``stiffness`` (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
-    distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], with ``in_situ`` only: the
-    distance within which a bone may press at rest, through tissue between them that is not meshed, such as a capsule or a bursa;
-    by default only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it
-    contact is frictionless.
+    distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], with ``in_situ`` only: the distance
+    within which a bone may press at rest, through tissue in between that is not meshed, such as a capsule or a bursa; by default it
+    presses only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is
+    frictionless.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}

@@ -4,12 +4,12 @@ from typing import Any
 
 from fem_reference.effects import LameLaw, State
 
-# Newton steps to the sum of the stretches: they leave 4e-11 of it for stretches from 0.3 to 3, and more of it inside out.
+# Newton steps for the sum of the stretches: their error is 4e-11 of it for stretches from 0.3 to 3, and greater in inverted states.
 _STEPS = 4
 
 
 class Corotated(LameLaw):
-    """``mu |F - R|^2 + lame/2 (J - 1)^2`` with R the rotation of F: the fixed corotated law (Stomakhin et al. 2012, Energetically
+    """``mu |F - R|^2 + lame/2 (J - 1)^2`` with R the rotation in F: the fixed corotated law (Stomakhin et al. 2012, Energetically
     consistent invertible elasticity, eq. 8).
 
     ``mu``, ``lame``: Lame's parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where s is the sum of the principal stretches, the

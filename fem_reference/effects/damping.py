@@ -1,4 +1,4 @@
-"""Drag of the ground on moving tissue: it keeps a free body from drifting, and makes a body leave an unstable state gradually."""
+"""Drag of the ground on moving tissue: it keeps a free body from drifting, and slows the departure from an unstable state."""
 
 from typing import Any, ClassVar
 
@@ -9,10 +9,10 @@ from fem_reference.foundations.units import VolumeDamping
 
 
 class Damping(Energy):
-    """A force per rest volume of ``-coefficient v``, v the velocity relative to the ground.
+    """A force per rest volume of ``-coefficient v``, with v the velocity relative to the ground.
 
-    Over a load step v is ``rate (u - before)`` (implicit Euler), which is the slope of ``coefficient / 2 rate |u - before|^2``:
-    a potential of the step, not a stored energy.
+    Over a load step v is ``rate (u - before)`` (implicit Euler), and the force is minus the derivative of
+    ``coefficient / 2 rate |u - before|^2``: a potential of the step, not a stored energy.
 
     ``coefficient``: [MPa s/mm^2].
     """

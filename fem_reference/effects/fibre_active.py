@@ -1,4 +1,4 @@
-"""Active muscle fibres: a tension by activation, greatest at their optimal length."""
+"""Active muscle fibres: a tension that activation causes, greatest at their optimal length."""
 
 from typing import Any, ClassVar
 
@@ -19,13 +19,13 @@ PEAK_STRESS = Range(
 
 
 class FibreActive(Ramped, Energy):
-    """``dW/dl = amount stress g(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``g = 9 (l - 0.4)^2`` from 0.4,
-    ``1 - 4 (1 - l)^2`` from 0.6, ``9 (l - 1.6)^2`` from 1.4, and 0 below 0.4 and above 1.6.
+    """``dW/dl = amount stress g(l)``, with ``l`` the isochoric fibre stretch divided by the optimal one: ``g = 9 (l - 0.4)^2`` from
+    0.4, ``1 - 4 (1 - l)^2`` from 0.6, ``9 (l - 1.6)^2`` from 1.4, and 0 below 0.4 and above 1.6.
 
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
-    Valid for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
+    Valid for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: outside, an activation has no effect.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -49,7 +49,7 @@ class FibreActive(Ramped, Energy):
 
 
 def _area(stretch: Any, state: State) -> Any:
-    """The integral of g from 1 to ``stretch``: the pieces at both ends cancel there, as g is symmetric about 1."""
+    """The integral of g from 1 to ``stretch``: the outer pieces cancel at 1, as g is symmetric about it."""
     rising = state.between(0.4, 0.6, stretch) - 0.4
     middle = state.between(0.6, 1.4, stretch) - 1
     falling = state.between(1.4, 1.6, stretch) - 1.6

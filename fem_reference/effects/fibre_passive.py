@@ -1,4 +1,4 @@
-"""Passive muscle fibres: resistance to stretch beyond their optimal length, by a toe and a line."""
+"""Passive muscle fibres: resistance to stretch beyond their optimal length, with a toe region and then a line."""
 
 from typing import Any, ClassVar
 
@@ -18,15 +18,15 @@ _SOURCE = (
 
 
 class FibrePassive(PassiveFibres):
-    """``dW/dl = stress f(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``f = 0`` up to 1,
+    """``dW/dl = stress f(l)``, with ``l`` the isochoric fibre stretch divided by the optimal one: ``f = 0`` up to 1,
     ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the tangent line.
 
     ``stress`` [MPa]: the peak active stress, by which Blemker normalises; ``p1``, ``p2``: without unit; ``optimal_stretch``: the
-    fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
-    doi 10.1016/j.jbiomech.2004.04.009.
+    fibre stretch at optimal length; ``linear_from``: a value of ``l``. Source: Blemker, Pinsky and Delp 2005, doi
+    10.1016/j.jbiomech.2004.04.009.
 
-    Valid for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
-    data of longer fibres supports this law. Slack fibres have no limit.
+    Valid for ``l`` up to 1.6, or up to ``linear_from`` if that is greater: there the active tension of the same source ends, and no
+    data on longer fibres support this law. There is no limit for slack fibres.
     """
 
     example: ClassVar[dict[str, Any]] = {

@@ -1,4 +1,4 @@
-"""Passive fibres by the law of FEBio: resistance to stretch by a toe, then a line in the stretch."""
+"""Passive fibres by the law of FEBio: resistance to stretch with a toe region, then a line in the stretch."""
 
 from typing import Any, ClassVar
 
@@ -8,18 +8,18 @@ from pydantic import Field
 from fem_reference.effects import PassiveFibres, State
 from fem_reference.foundations.units import PositivePressure
 
-# On (0, 1), as Python floats: numpy numbers would turn symbols into arrays.
+# On (0, 1), as Python floats, as numpy's would turn symbols into arrays.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=True))
 
 
 class FibrePassiveFebio(PassiveFibres):
     """``l dW/dl = 0`` up to an isochoric fibre stretch ``l`` of 1, ``c3 (exp(c4 (l - 1)) - 1)`` up to ``linear_from``, and beyond
-    it ``c5 l + c6``, where c6 makes it continuous.
+    it ``c5 l + c6``, where c6 makes the function continuous.
 
     ``c3``, ``c5`` [MPa], ``c4`` without unit. Source: FEBio Theory Manual, "Transversely Isotropic Hyperelastic"; Weiss, Maker and
-    Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an exponential integral, here by a Gauss-Legendre
-    rule: its error is below 1e-12 c3 while ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
+    Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an exponential integral, computed here by a
+    Gauss-Legendre rule, whose error is below 1e-12 c3 while ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
     """
 
     example: ClassVar[dict[str, Any]] = {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3}

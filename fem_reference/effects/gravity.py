@@ -12,7 +12,7 @@ from fem_reference.foundations.units import AccelerationVector, Density
 
 
 class Gravity(Ramped, Energy):
-    """``-amount rho g . u``, with u the displacement.
+    """The energy ``-amount rho g . u``, with u the displacement.
 
     ``density``: rho at rest [tonne/mm^3]; ``acceleration``: g (3,) [mm/s^2].
     """

@@ -1,4 +1,4 @@
-"""Heart muscle: stiffer the more it is strained, and most along its fibres."""
+"""Heart muscle, which is the stiffer the more it is strained, and stiffest along its fibres."""
 
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ class Guccione(Energy):
     ``E = (J^(-2/3) C - 1) / 2`` in axes along the fibre (f) and any two across it (s, n).
 
     ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
-    Land et al. 2015, doi 10.1098/rspa.2015.0641, both of incompressible material. Without the factor ``J^(-2/3)`` the pressure
+    Land et al. 2015, doi 10.1098/rspa.2015.0641, both for incompressible material. Without the factor ``J^(-2/3)`` the pressure
     unknown has to balance all of a large tension, and mixed elements in two layers lose equilibrium in the ventricle of Land et al.
     """
 

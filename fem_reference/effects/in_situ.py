@@ -13,10 +13,10 @@ class InSitu(Prestrain):
     rest balances all effects at the first frame, an activation included, so that ``F = 1`` is in equilibrium there.
 
     Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
-    turns with the body. They are the strain and pressure of an isotropic body under the forces at rest, with the shear and bulk
+    rotates with the body. They are the strain and pressure of an isotropic body under the forces at rest, with the shear and bulk
     modulus at rest of the scene's effects: of all stresses that balance these forces, this one has the least energy. That body is
     supported by the springs of attachments, which are extended at rest, and by the bones, which press wherever the muscle touches
-    them or is within ``support`` of them (``contact``), through the tissue between.
+    them or is within ``support`` of them (``contact``), through the tissue in between.
 
     ``stretch``: without unit, above 1 where fibres are taut at rest; 1 where only an activation acts there.
     Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find by iteration a prestrain with this

@@ -1,4 +1,4 @@
-"""Near-incompressibility by a penalty on volume change, without a pressure unknown: it locks where the mixed form does not."""
+"""Near-incompressibility by a penalty on volume change, without a pressure unknown, which locks where the mixed form does not."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from fem_reference.effects import State, VolumeLaw
 
 
 class IncompressiblePenalty(VolumeLaw):
-    """``K/2 (J - 1)^2``: ``incompressible`` with a pressure that is free at every point.
+    """``K/2 (J - 1)^2``: the law ``incompressible`` with a pressure that is free at every point.
 
     ``bulk``: bulk modulus K [MPa]. Valid for J from 1/2 to 2, for the reasons of ``incompressible``.
     """

@@ -11,10 +11,10 @@ from fem_reference.foundations.units import Density
 
 
 class Inertia(Energy):
-    """A force per rest volume of ``-density a``, a the acceleration, by an implicit method of second order.
+    """A force per rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
 
-    Of the generalised-alpha family that is the method in which stresses are those at the end of a step (Wood, Bossak and
-    Zienkiewicz 1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
+    It is the member of the generalised-alpha family in which stresses are those at the end of a step (Wood, Bossak and Zienkiewicz
+    1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
     ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``. A step scales the shortest waves by r, the
     ``spectral_radius``: 1 keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. At the end of a
     step the sum of ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies is least: a potential of the step, not a
@@ -32,8 +32,8 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a beam, from the force of its acceleration, and the stress of the wave that a jump of velocity sends through
-        it. The first frequency of the beam follows from its deflection under its own weight.
+        """The lag of a beam by the force of its acceleration, and the stress of the wave that a jump of velocity sends through the
+        beam. The first frequency of the beam follows from its deflection under its own weight.
         """
         square = scene.bend(self.density)  # the inverse square of the frequency
         acceleration, jump = scene.in_time(scene.in_time(scene.acceleration)), scene.in_time(scene.jump)
@@ -52,7 +52,7 @@ class Inertia(Energy):
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
-        """The displacement [mm] after ``seconds`` without forces, from ``u``, velocity ``v`` and acceleration ``a`` there."""
+        """The displacement [mm] after ``seconds`` without forces, from ``u``, ``v`` and ``a`` at the start."""
         alpha, _, beta = self._rule()
         return u + seconds * v + seconds**2 * (0.5 - beta - beta * alpha / (1 - alpha)) * a
 

@@ -1,4 +1,4 @@
-"""Membranes on the surface, which resist stretch and not bending: aponeurosis, fascia."""
+"""Membranes on the surface, which resist stretch but not bending: aponeuroses and fasciae."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -14,8 +14,8 @@ class Membrane(Load):
     present area over that at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose thickness
     follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, of membranes).
 
-    ``on``: the part of the surface, and ``in`` a region, if any, by the share that it has of this part, linear between the vertices
-    of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].
+    ``on``: the part of the surface; ``in``, if given: a region, in proportion to whose shares it acts there, linear between the
+    vertices of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].
 
     Stretched by l in all directions it has the tension ``h mu (1 - l^-6)`` per present length. In compression it would
     wrinkle; here it resists instead, like a sheet that the tissue below keeps flat.
@@ -29,7 +29,7 @@ class Membrane(Load):
     region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
 
     def potential(self, state: State, normal: Sequence[Any]) -> Any:
-        """Energy per rest area [N/mm], by the share of the point in its region."""
+        """Energy per rest area [N/mm], multiplied by the share of the point in the region."""
         area = sum(sum(c * n for c, n in zip(row, normal, strict=True)) ** 2 for row in state.cofactors)
         inside = state.I1 - state.square_stretch(normal)
         return state.share(self.region) * self.thickness * self.mu / 2 * (inside + 1 / area - 3)

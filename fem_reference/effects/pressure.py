@@ -16,20 +16,20 @@ class Pressure(Ramped, Load):
 
     On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. A
     clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle of legs a, V/V0 is
-    greater by 0.15 mu / K (a / L)^3 p / K, for example 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
+    greater by 0.15 mu / K (a / L)^3 p / K: for example, 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it compresses the thickness."""
+        """The distance by which it compresses the muscle's thickness."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The load on the whole present part."""
+        """The load on the whole part in its present shape."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 

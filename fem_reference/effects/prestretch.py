@@ -27,7 +27,7 @@ class Prestretch(Ramped, Prestrain):
         return self
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The shortening of released fibres, and the tension of the matrix in them."""
+        """The shortening of fibres as they are released, and the stress of the matrix then."""
         part = scene.greatest(self) * abs(self.stretch - 1)
         return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 

@@ -9,8 +9,8 @@ from fem_reference.foundations.formula import Formula, evaluate
 class Source(FieldEffect):
     """``-f``. Report eq. 4.4: ``D f``.
 
-    ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the
-    mean y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has the share of f that lies above it.
+    ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the mean
+    y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has f in proportion to its share above.
     """
 
     example: ClassVar[dict[str, Any]] = {"strength": "x*y", "where": "everywhere"}

@@ -8,10 +8,10 @@ from fem_reference.foundations.units import PositiveLength, Stiffness
 
 class Tendon(Interaction):
     """Tension ``k (l - l0)`` along straight lines that are longer than at rest. They run from the surface within ``reach`` of the
-    ends of fibres that continue as the ``tendon`` of an attachment, to that point of its bone; slack lines do not push.
+    ends of fibres that continue as the ``tendon`` of an attachment to its point on the bone; slack lines do not push.
 
-    ``on``: that attachment; ``stiffness`` [N/mm]: of all lines together, k by share of the area, ``E A / l0`` of a tendon of the
-    modulus E and the section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with ``in_situ``.
+    ``on``: that attachment; ``stiffness`` [N/mm]: that of all lines together, of which each has a share k by its area: ``E A / l0``
+    for a tendon of modulus E and cross-section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with ``in_situ``.
     Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 

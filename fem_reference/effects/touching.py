@@ -10,13 +10,13 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """The pressure of ``contact``, of the gap between two muscles, on both alike, or between places of a single one, with any
-    sliding (``fem_reference.problems.touching.Touching``).
+    """The pressure law of ``contact``, applied to the gap between two muscles, on both alike, or between places of a single one,
+    with any sliding (``fem_reference.problems.touching.Touching``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the two, or the two places, overlap by at most p / stiffness. ``smoothing`` [mm]:
-    the distance below which a muscle is felt, and the most by which it may overlap another, or itself, at rest. ``friction``: the
-    coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Several muscles touch each other, and none
-    touches itself.
+    the distance at which contact begins, and the greatest overlap with another muscle, or with itself, that is allowed at rest.
+    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Of several muscles, each
+    touches the others but not itself.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}

@@ -1,6 +1,6 @@
 """Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt).
 
-Short waves of an unstable state grow no faster than long ones.
+With it, short waves of an unstable state grow no faster than long ones.
 """
 
 from typing import Any, ClassVar
@@ -11,11 +11,11 @@ from fem_reference.foundations.units import Viscosity as Coefficient
 
 
 class Viscosity(Energy):
-    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, which is 0 in incompressible material.
+    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, 0 in incompressible material.
 
     Over a load step D is ``rate e`` (implicit Euler), ``e = (f^T f - 1)/2`` the Green strain of ``f = F F_before^-1``, and the
-    stress the slope of ``eta rate |e|^2`` per volume before the step: a potential of the step, not a stored energy, which rotations
-    do not change. It agrees with that law to first order in the step.
+    stress is the derivative of ``eta rate |e|^2`` per volume before the step: a potential of the step, not a stored energy, which
+    rotations do not change. It agrees with the law above to first order in the step.
 
     ``eta``: [MPa s].
     """
@@ -27,7 +27,7 @@ class Viscosity(Energy):
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a body, as a part of its travel, over its relaxation time."""
+        """The lag of a body, as a share of its travel, from its relaxation time."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         rule, lag = "Deborah number, relaxation time over the time of the motion", 0.25 * deborah * scene.travel

@@ -4,7 +4,7 @@ import errno
 
 # Error numbers of a full disk, an exhausted quota and a file that is too large.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# The most characters of a value that a message shows.
+# The greatest number of characters of a value that a message shows.
 _SHOWN = 400
 
 
@@ -33,4 +33,4 @@ def _shown(value: object) -> str:
 
 
 class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller
-    """A package or program that this job needs is not installed; the message says how to get it."""
+    """A package or program that is needed is not installed; the message states how to get it."""

@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 FUNCTIONS = ("sin", "cos", "exp", "sqrt", "tanh")
 COORDINATES = ("x", "y", "z")
 _WANT = f'a number, or a formula of x, y, z, pi, + - * / ** and {", ".join(FUNCTIONS)}, such as "sin(pi*x)"'
-_LONGEST = 1000  # characters; far below what would exhaust the recursion of a walk over it
+_LONGEST = 1000  # characters, far fewer than would exhaust the recursion over its syntax tree
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -37,7 +37,7 @@ def _checked(value: object) -> str:
     except (SyntaxError, InputError, RecursionError) as error:
         raise ValueError(_WANT) from error
     except ArithmeticError:
-        pass  # still a formula, although it is not finite at the point tried
+        pass  # still a formula, although it has no finite value at the point tried
     return value
 
 

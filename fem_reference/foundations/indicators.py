@@ -1,8 +1,8 @@
 """Indicators of the effects that a case needs, estimated before anything is solved.
 
-Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
-doi 10.1006/jcph.2002.7183). Here these are the displacement [mm] and the stress [MPa] that the effect causes, estimated from rest
-geometry, motion and parameters, and compared with the wanted accuracy. An isometric contraction causes stress and no displacement.
+Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002, doi
+10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] by an effect, estimated from rest
+geometry, motion and parameters, and compared with the accuracy. An isometric contraction causes stress and no displacement.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Indicator:
-    """Indicator of an effect: an ``estimate`` [mm] of the displacement of the surface that it causes, root mean square at the
-    worst frame; the greatest ``stress`` [MPa] there; and the ``number`` from which both follow, with its ``rule``.
+    """Indicator of an effect: an ``estimate`` [mm] of the displacement of the surface that it causes, root mean square at the worst
+    frame; the greatest ``stress`` [MPa] there; and the ``number`` from which both follow, with the ``rule`` that gives it.
     """
 
     rule: str
@@ -40,12 +40,12 @@ class Estimates:
 
     ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its fibres at rest
     length, the mean over the frames; ``fixed``: the number of bones that it is attached to; ``sag``: the distance of its axis from
-    the straight line between two of them; ``lean`` of fibres against that line, from 0 to 1; ``travel``: the greatest displacement
-    of its surface by the motion of the bones; ``stretch``: the smallest and the greatest stretch of the line between the
-    attachments, taken for that of the fibres; ``interval`` between frame numbers, None where the case does not state it; the
-    greatest ``speed``, its part ``sideways`` to that line, ``jump`` (of velocity at an instant) and ``acceleration``, per frame
+    the straight line between two of them; ``lean``: the inclination of fibres to that line, from 0 to 1; ``travel``: the greatest
+    displacement of its surface by the motion of the bones; ``stretch``: the smallest and the greatest stretch of the line between
+    the attachments, taken for that of the fibres; ``interval``: the time between frame numbers, None where the case does not state
+    it; the greatest ``speed``, speed ``sideways`` of that line, ``jump`` of velocity at an instant, and ``acceleration``, per frame
     number; ``frames``: all frame numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]: an effect that
-    changes less is not needed; ``near``: nearness by bone.
+    changes less is not needed; ``near``: the nearness to each bone.
     """
 
     length: float
@@ -69,8 +69,8 @@ class Estimates:
 
     def bend(self, force: float) -> float:
         """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
-        length, thickness and shear modulus are those of the muscle, its Young's modulus three times the latter. The mean is 0.6
-        of the displacement in the middle, halved because bending also stretches. A free body moves by its own length.
+        length, thickness and shear modulus are those of the muscle, its Young's modulus three times the last. The mean is 0.6 of
+        the displacement in the middle, halved because bending also stretches. For a free body, it is its own length.
         """
         if not self.fixed:
             return self.length
@@ -79,15 +79,15 @@ class Estimates:
         return float(0.3 * middle) / (1 + self.taut(self.tension))
 
     def taut(self, pull: float) -> float:
-        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, over its own."""
+        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, relative to its own."""
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
-        """Shift [mm], root mean square, of a clamped bar along itself by a ``force`` per volume [N/mm3]: 2/3 of the greatest."""
+        """Shift [mm], root mean square, of a clamped bar along itself by a ``force`` per volume [N/mm3]: 2/3 of the maximum."""
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
-        """Lag [mm] of a body that forces would delay by a ``distance`` [mm]: less than it travels."""
+        """Lag [mm] of a body that forces would delay by a ``distance`` [mm]; it is less than the travel."""
         return distance / (1 + distance / self.travel) if self.travel else 0.0
 
     def greatest(self, effect: Any) -> float:
@@ -96,7 +96,7 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
-        0.6 of its sag, against its bending stiffness; inclined fibres also shear it. Without two clamped ends it can shorten.
+        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear it. Without two clamped ends it shortens.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)

@@ -1,4 +1,4 @@
-"""Numbers with their first and second derivatives: expressions of them are differentiated exactly, without finite differences."""
+"""Numbers with their first and second derivatives: expressions of jets are differentiated exactly, without finite differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ class Jet:
     """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,); the
     curvature is None where it is not needed, which saves nine tenths of the work.
 
-    A slope or curvature that is the same at all points has length 1 along them. Arrays combined with a jet have as many axes as
-    its points, or none.
+    A slope or curvature that is the same at all points has length 1 along their axes. An array combined with a jet has as many axes
+    as the points of the jet, or none.
     """
 
     value: Any
     slope: Any
     curvature: Any = None
 
-    __array_ufunc__ = None  # an array on the left lets the jet compute
+    __array_ufunc__ = None  # an array on the left leaves the operation to the jet
 
     def chained(self, value: Any, first: Any, second: Any) -> "Jet":
         """A function of the jet, given its ``value`` and its ``first`` and ``second`` derivatives at ``self.value``."""
@@ -73,7 +73,7 @@ class Jet:
 
 
 def variables(values: Floats, *, curved: bool = True) -> list[Jet]:
-    """The n variables as jets, at points where they have ``values`` (n, ...); without curvatures where not ``curved``."""
+    """The n variables as jets, at points where they have ``values`` (n, ...); without curvatures unless ``curved``."""
     count, along = len(values), (1,) * (values.ndim - 1)
     slopes, flat = np.eye(count).reshape(count, count, *along), np.zeros((count, count, *along)) if curved else None
     return [Jet(value, slope, flat) for value, slope in zip(values, slopes, strict=True)]
@@ -105,7 +105,7 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
 
 
-# The functions of jets, numbers and arrays.
+# The functions that accept jets, numbers and arrays.
 JET_FUNCTIONS = Functions(
     exp=_differentiated(lambda v: (e := np.exp(v), e, e)),
     log=_differentiated(lambda v: (np.log(v), 1 / v, -1 / v**2)),

@@ -6,17 +6,17 @@ from typing import Literal
 
 from fem_reference.foundations.records import Record
 
-# The accepted difference of energy and work in a load step, as a share of the greatest energy so far. Above it the state halfway
-# is checked too; a difference that remains makes the run doubtful.
+# The accepted difference of energy and work in a load step, as a share of the greatest energy so far. Above it the balance is
+# computed again with a state halfway; if a difference remains, the run is doubtful.
 ENERGY_GAP = 0.05
 
-# V/V0 is det F; the fibre stretch is the one in the energies: isochoric, with the prestretch.
+# V/V0 is det F; the fibre stretch is that of the energies, isochoric and with the prestretch.
 Measure = Literal["V/V0", "fibre stretch"]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A law is meant for states whose ``measure`` lies from ``low`` to ``high``, both without unit."""
+    """The states for which a law is meant: their ``measure`` lies between ``low`` and ``high``, both without unit."""
 
     measure: Measure
     low: float = 0.0

@@ -11,7 +11,7 @@ from fem_reference.foundations.records import Record
 
 
 class RampPoint(Record):
-    """The amount of an effect at a frame number: up to a thousand times its parameters."""
+    """The amount of an effect at a frame number: a factor of its parameters, up to a thousand."""
 
     frame: float
     amount: float = Field(ge=0, le=1000)
@@ -36,7 +36,7 @@ class Shape(Protocol):
         """
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None where unknown."""
+        """The present vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
         """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None

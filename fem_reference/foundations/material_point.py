@@ -33,7 +33,7 @@ NUMPY = Functions(np.exp, np.log, np.sqrt, np.cos, np.sin, _above)
 
 
 class Moduli(NamedTuple):
-    """Stiffness at rest [MPa], 0 for none: ``shear`` (across fibres, if any), ``bulk``, and the scaling stress of ``fibres``."""
+    """Stiffness at rest [MPa], 0 for none: ``shear`` (across fibres, if any), ``bulk``, and the stress that scales ``fibres``."""
 
     shear: float = 0.0
     bulk: float = 0.0
@@ -42,13 +42,13 @@ class Moduli(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """The state at a point that an expression depends on; each entry a number, an array over points or a symbolic expression.
+    """The state at a point that an expression depends on; each entry is a number, an array over points or a symbolic expression.
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
-    unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
+    unknown [MPa], None where no effect adds it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there are
     none; ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] at the start of
-    the load step, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] the displacement at constant velocity, ``rate``
-    [1/s] one over the duration of the step, 0 in a quasi-static one; ``regions``: the share, from 0 to 1, that the point has in
+    the load step, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] the displacement at constant velocity,
+    ``rate`` [1/s] 1 over the duration of the step, 0 in a quasi-static one; ``regions``: the share of the point, from 0 to 1, in
     each region of the body.
     """
 
@@ -65,7 +65,7 @@ class State:
     functions: Functions = NUMPY
 
     def share(self, region: str) -> Any:
-        """The share, from 0 to 1, of the point in a ``region``: a name, ``"not NAME"`` for the rest, or ``""`` for the body."""
+        """The share, from 0 to 1, of the point in a ``region``: a name, ``"not NAME"`` for the rest, or ``""`` for all."""
         if region.startswith(REST):
             return 1 - self.regions[region.removeprefix(REST)]
         return self.regions[region] if region else 1.0
@@ -111,7 +111,7 @@ class State:
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
     def stretched(self, along: Any) -> Sequence[Sequence[Any]]:
-        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after a stretch l ``along`` the fibre f at the same volume."""
+        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after an isochoric stretch l ``along`` the fibre f."""
         across = 1 / self.functions.sqrt(along)
         ends = [sum(F * a for F, a in zip(row, self.fibre, strict=True)) for row in self.F]
         return [
@@ -120,7 +120,7 @@ class State:
         ]
 
     def between(self, low: Any, high: Any, x: Any) -> Any:
-        """``x``, or the nearer bound where it lies beyond the bounds."""
+        """``x``, or the nearer bound where x lies outside the bounds."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))
 

@@ -1,6 +1,6 @@
 """Triangle surfaces, tetrahedral meshes and polylines: records, measures, and checks that a surface is usable.
 
-Vocabulary of shapes: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
+Shapes of arrays: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """
 
 import hashlib
@@ -162,7 +162,7 @@ def check_corners(surface: Surface) -> None:
 def check_closed(surface: Surface) -> Surface:
     """The surface, outward, if it bounds one body: finite, closed, manifold, consistently oriented, every point used.
 
-    InputError otherwise, with the number of offending edges, vertices or parts and the place of the first or smallest.
+    InputError otherwise, with the number of wrong edges, vertices or parts, and the place of the first or smallest of them.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -202,7 +202,7 @@ def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
-    """The number (count,) of the connected part that each of ``count`` things is in, ``first`` (e,) linked to ``second``."""
+    """The number (count,) of the connected part of each of ``count`` things, where ``first`` (e,) are linked to ``second``."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
@@ -238,7 +238,7 @@ def enclosed_volume(points: Floats, triangles: Ints) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Polylines:
-    """Polylines one after the other: ``points`` (n, 3) [mm]; line i is ``points[offsets[i]:offsets[i + 1]]``."""
+    """Polylines, stored one after the other: ``points`` (n, 3) [mm]; line i is ``points[offsets[i]:offsets[i + 1]]``."""
 
     points: Floats
     offsets: Ints

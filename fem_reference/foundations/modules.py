@@ -1,4 +1,4 @@
-"""The modules that stand in folders: what a package offers, one file or folder each."""
+"""The modules in folders, one file or folder each, which are what a package offers."""
 
 import pkgutil
 from collections.abc import Iterable
@@ -13,5 +13,5 @@ def names(places: Iterable[str]) -> tuple[str, ...]:
 
 @cache
 def _listed(places: tuple[tuple[str, int], ...]) -> tuple[str, ...]:
-    """The names of the modules in folders, each with its time of change."""
+    """The names of the modules in folders, each given with the time of its last change."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules([place for place, _ in places])))

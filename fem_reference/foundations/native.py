@@ -14,7 +14,7 @@ from pathlib import Path
 
 @cache
 def machine() -> str:
-    """The kind of this processor, as a hash: code compiled for one kind need not run on another."""
+    """The kind of this processor, as a hash: code compiled for one kind may not run on another."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         known = next(line for line in lines if line.startswith(("flags", "Features")))
@@ -25,7 +25,7 @@ def machine() -> str:
 
 def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
     """The functions of a C file, compiled with ``flags`` and kept in a ``folder``; OSError without a compiler or such a folder,
-    RuntimeError with what the compiler says where it cannot compile the file.
+    RuntimeError with the compiler's message where it cannot compile the file.
     """
     compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
     key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *flags, machine()]).encode())

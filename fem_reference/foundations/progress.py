@@ -1,4 +1,4 @@
-"""Lines of progress of the package, given to a caller's own function."""
+"""The package's lines of progress, passed to a function of the caller."""
 
 import logging
 from collections.abc import Callable, Iterator

@@ -13,7 +13,7 @@ from fem_reference.foundations.errors import InputError
 
 
 class Record(BaseModel):
-    """A frozen record whose keys are all known, whose values have the type stated, and whose numbers are finite.
+    """A frozen record whose keys are all known, whose values have the declared types, and whose numbers are finite.
 
     Text and truth values are not accepted as numbers; an integer is accepted where a float is wanted.
     """
@@ -70,7 +70,7 @@ def check_once(names: Sequence[str], place: str) -> None:
 
 
 def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str) -> None:
-    """Raise InputError where one of the ``uses``, (key, name) each, is of a name that is not ``known``."""
+    """Raise InputError where one of the ``uses``, (key, name) each, has a name that is not ``known``."""
     for key, name in uses:
         if name not in known:
             want = f"one of {', '.join(known)}" if known else "none, as none is defined"
@@ -93,7 +93,7 @@ def parse[R](record: type[R], table: object, place: str) -> R:
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
-        # Unknown keys first: a mistyped key explains more than the missing one that was meant.
+        # Unknown keys come first: a mistyped key explains more than the error that the intended key is missing.
         wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
         raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
 
@@ -105,7 +105,7 @@ def _own(errors: Sequence[Any]) -> list[Any]:
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error for all that are ``wrong``, the first with its own place, one for each key."""
+    """One error for all that are ``wrong``, at most one for each key, at the place of the first."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -116,14 +116,14 @@ def together(wrong: Sequence[InputError]) -> InputError:
 
 
 def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]], Any]) -> Any:
-    """A ``value`` of a file with all sequences of a ``kind``, lists of files or tuples of records, ``into`` the other."""
+    """A ``value`` of a file with all sequences of a ``kind``, lists of files or tuples of records, turned ``into`` the other."""
     if isinstance(value, dict):
         return {key: _turned(inside, kind, into) for key, inside in value.items()}
     return into(_turned(inside, kind, into) for inside in value) if isinstance(value, kind) else value
 
 
 def join(place: str, key: str) -> str:
-    """``place`` with ``key`` below it: a file takes a colon, a key takes a dot."""
+    """``place`` with ``key`` below it: after a colon if it is a file, after a dot if it is a key."""
     return place if not key else f"{place}{': ' if place.endswith(('.toml', '.json')) else '.'}{key}"
 
 
@@ -156,7 +156,7 @@ def _keys(table: object, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
 
 
 def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
-    """The keys that files have of the record that ``path`` leads to (a list index stays in the same record)."""
+    """The keys, in files, of the record to which ``path`` leads (a list index stays in the same record)."""
     for part in path:
         if isinstance(part, str) and part in getattr(record, "model_fields", {}):
             record = _record_inside(record.model_fields[part].annotation)

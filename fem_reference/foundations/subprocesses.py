@@ -1,6 +1,6 @@
 """Python subprocesses: their start and end, the resources that they use, and folders that they share.
 
-They import this copy of the package and nothing from the folder that they are started in.
+They import this copy of the package, and nothing from the folder in which they are started.
 """
 
 import math
@@ -21,7 +21,7 @@ from filelock import FileLock, Timeout
 _STARTER = "FEM_REFERENCE_STARTER"
 _ROOT = Path(__file__).resolve().parent.parent.parent
 _PREFIX, _LOCK = "fem_reference_scratch-", ".lock"
-# Age [s] above which a folder whose lock is free is abandoned, and not about to be locked.
+# The age [s] above which a folder with a free lock counts as abandoned, not as about to be locked.
 _SETTLED = 60.0
 
 
@@ -31,14 +31,14 @@ def command(*words: str) -> list[str]:
 
 
 def environment(**settings: str) -> dict[str, str]:
-    """Our environment with this copy of the package before any other, and with ``settings``."""
+    """The environment of this process, with this copy of the package before any other, and with ``settings``."""
     theirs = [str(Path(path).absolute()) for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
     paths = [str(_ROOT), *theirs]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), _STARTER: str(os.getpid()), **settings}
 
 
 def end_with_starter() -> None:
-    """End this process a second or two after the one that started it, directly or not, even if that is killed."""
+    """End this process a second or two after the one that started it, directly or not, even if the latter is killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()
@@ -68,8 +68,8 @@ def forget_peak_memory() -> None:
 
 
 def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]:
-    """Processor times [s] by process number, of a ``process`` and its running descendants; with ``of_ended`` each includes those of
-    the ended subprocesses it waited for. Empty where the system does not report them.
+    """Processor times [s] by process number, of a ``process`` and its running descendants; with ``of_ended``, each includes the
+    times of ended subprocesses for which it has waited. Empty where the system does not report them.
     """
     parents, times = dict[int, int](), dict[int, float]()
     for folder in Path("/proc").glob("[0-9]*"):
@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The share of the machine used by other processes since then, None where the system does not report it."""
+        """The share of the machine that other processes have used since then, None where the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
@@ -137,7 +137,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def _clear(root: Path) -> None:
-    """Remove folders that killed processes left; those that may not be removed stay."""
+    """Remove folders that killed processes left; those that it may not remove stay."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

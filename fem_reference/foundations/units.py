@@ -1,4 +1,4 @@
-"""Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only place where a unit is text.
+"""Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only module in which a unit is text.
 
 The annotated types are what scene records are made of: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
 """
@@ -13,13 +13,13 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator
 
 # The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
-# number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unseen.
+# number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unnoticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 
 
 class Kind(NamedTuple):
-    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three in a file, the ``greatest`` magnitude accepted,
-    above any real one and without loss of digits; for a kind without a unit, the texts accepted in its place.
+    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three in a file, the ``greatest`` accepted magnitude,
+    which is above any real one and loses no digits; and for a kind without a unit, the texts that are accepted in place of one.
     """
 
     unit: str
@@ -74,7 +74,7 @@ COMMON = {
 }
 # A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
-# Forbidden in a unit: an exponent that is no integer of one or two digits, or has an exponent itself, as in mm^9^9^9.
+# Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
 # The most characters of a quantity.
 _LONGEST = 100
@@ -86,7 +86,7 @@ _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 @cache
 def _registry() -> Any:
-    import pint  # here, as it takes 0.4 s, which processes that read common units alone save
+    import pint  # here, as it takes 0.4 s, which processes that read only common units save
 
     return pint.UnitRegistry(cache_folder=None)
 
@@ -118,7 +118,7 @@ def quantity(text: object, kind: str) -> float:
 
 @cache
 def _factor(unit: str, inside: str) -> float:
-    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, where the two are not of one kind."""
+    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, where the two are of different kinds."""
     if unit == inside or (unit, inside) in COMMON:
         return COMMON.get((unit, inside), 1.0)
     one = _registry().Quantity(1.0, _registry().parse_units(unit))
@@ -204,7 +204,7 @@ def field_unit(field: Any) -> str:
 
 
 def kinds(annotation: Any) -> list[Any]:
-    """A type and all that it is made of."""
+    """A type and all types that it is made of."""
     return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in kinds(part))]
 
 

@@ -24,7 +24,7 @@ from fem_reference.io import files
 from fem_reference.scenes.fibres import PolylineFile, Traced
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
-# Sample points of a triangle: its middle, near its corners, near the middles of its sides.
+# Sample points of a triangle: its middle, points near its corners, and points near the middles of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
 # The most triangles of a draped patch: enough for a patch of some metres.
 _MOST_TRIANGLES = 2**20
@@ -51,7 +51,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def unshifted(case: MuscleCase) -> MuscleCase:
-    """The case with its attachments at their unshifted landmarks; itself where no outline is shifted."""
+    """The case with its attachments at their unshifted landmarks; the case itself where no outline is shifted."""
     still = tuple(
         one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
         if one.outline and one.outline.shift and one.outline.shift.by
@@ -75,9 +75,9 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under its attached part,
-    although they do not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares``
-    (k, 3): those of the corners of the triangles of ``surface``.
+    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under the attached part of the surface,
+    although they do not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): the
+    attached shares of the corners of each triangle of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -133,9 +133,9 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
-    """The patches draped on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the bone.
+    """The patches draped on the bone: in triangles with sides of at most 2 mm, whose corners are moved to its nearest points.
 
-    Landmarks lie on the bone, but the triangles between them do not in a hollow: over the iliac fossa they are 13 mm off, more
+    Landmarks lie on the bone, but over a hollow the triangles between them do not: over the iliac fossa they are 13 mm off, more
     than the thickness of the muscle there.
     """
     longest = _longest_side(patches)
@@ -153,7 +153,7 @@ def _longest_side(surface: Surface) -> float:
 
 
 def fan(points: Floats) -> Surface:
-    """Triangles from the centroid of ``points`` (n, 3) to each two successive ones by angle in their best-fit plane."""
+    """Triangles of the centroid of ``points`` (n, 3) and two successive points, ordered by angle in the best-fit plane."""
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)
     x, y, _ = axes @ (points - centre).T
@@ -184,7 +184,7 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this many tets.
 TETS = 8000
-# Lines traced for each surface fibre needed; the outermost, just below the surface, are used as fibres on it.
+# Lines traced for each surface fibre needed; the outermost, just below the surface, become the surface fibres.
 _OUTER = 5
 
 
@@ -205,7 +205,7 @@ def _turning(case: MuscleCase) -> Floats:
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point: that of the
-    nearest, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, of a size [mm].
+    nearest fibre, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, by their size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
@@ -234,13 +234,13 @@ def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, D
 
 
 def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
-    """The tetrahedra in a closed ``surface`` for fields between attachments, by ``fill`` of a size [mm]."""
+    """The tetrahedra in a closed ``surface`` for fields between attachments, made by ``fill`` of a size [mm]."""
     return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
-    it, which scales the shear by their tension. Traced and mapped fibres follow the axis, except for pennation and rotation.
+    it. It scales the shear by their tension. Traced and mapped fibres follow the axis, except for pennation and rotation.
     """
     turning = _turning(case)
     if (lines := _given(case)) is None:

@@ -22,10 +22,10 @@ from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 from fem_reference.problems.touching import Touching
 
-_OUTWARDS = 0.7  # the share of the path from the middle of a cell to each node at which fields are checked too
+_OUTWARDS = 0.7  # fields are also checked this far along the path from the middle of a cell to each node
 Kind = Literal["tetrahedron", "hexahedron"]
-# By element: kind of cell, degree of the displacement, degree of the pressure (None: no such unknown; 0: constant in each cell).
-# Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
+# By element: kind of cell, degree of the displacement, degree of the pressure (None: there is no such unknown; 0: it is constant in
+# each cell). Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
 ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "P1": ("tetrahedron", 1, None),
     "P1/P1": ("tetrahedron", 1, 1),
@@ -40,19 +40,19 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """True for an element with displacement and pressure of one degree, whose pressure would oscillate without stabilisation.
+    """True for an element with displacement and pressure of the same degree: its pressure would oscillate without stabilisation.
 
-    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the
-    mean of the second derivatives of the energy by F_ij, i != j. It falls with the square of the cell size.
+    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the mean
+    of the second derivatives of the energy with respect to F_ij, i != j. It falls with the square of the cell size.
 
-    Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
+    Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as in White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
     _, displacement, pressure = ELEMENTS[element]
     return displacement == pressure
 
 
 def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
-    """The facets of one cell only, (f, 3 or 4) corners as in ``facet_corners``, sorted by ascending corners; that cell (f,)."""
+    """The facets that belong to one cell only, as sorted corners (f, 3 or 4) as in ``facet_corners``, and that cell (f,)."""
     sides = np.array(facet_corners(mesh.kind))
     every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
     _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
@@ -138,12 +138,12 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its
-    reaction force is reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a
-    picklable callable of rest points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm].
-    ``stiffness`` [MPa/mm] of springs over the area that pull towards the path; None: exact. A skin has springs only.
-    ``anchor`` [mm]: the rest place of a point on the path, to which all springs of a skin go as straight tendons: each pulls along
-    its line while that is longer than at rest.
+    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
+    reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
+    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: that of springs over the
+    area, which pull towards the path; None where the displacement is exact. A skin has springs only. ``anchor`` [mm]: the rest
+    place of a point on the path, to which all springs of a skin go as straight tendons: each pulls along its line while the line is
+    longer than at rest.
     """
 
     name: str
@@ -154,7 +154,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it has none."""
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it gives none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -188,9 +188,9 @@ class ByCell:
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
     ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
-    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at
-    ``frames[0]``, where the body does not start at rest; ``regions``: by name those in which effects act, of which some lie
-    ``within`` a range of cells, the first and the one after the last: those of one of several pieces.
+    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``,
+    where the body does not start at rest; ``regions``: by name, those in which effects act. Those of one of several pieces lie
+    ``within`` a range of cells, the first and the one after the last.
     """
 
     mesh: Cells
@@ -222,23 +222,23 @@ class Body:
 
     @property
     def begun(self) -> bool:
-        """True where the body does not begin at rest and free of stress."""
+        """True unless the body begins at rest and free of stress."""
         tense = in_situ.among(self.effects) is not None
         return self.start is not None or tense or (self.contact is not None and self.contact.in_situ is not None)
 
     @property
     def rubs(self) -> bool:
-        """True with friction, where a state depends on the path to it."""
+        """True where there is friction, so that a state depends on the path to it."""
         return any(one is not None for one in self.frictions)
 
     @property
     def remembers(self) -> bool:
-        """True where contact depends on earlier states: with friction, and where a part of the surface touches itself."""
+        """True where contact depends on earlier states: where there is friction, or a part of the surface touches itself."""
         return self.rubs or any(law.one == law.other for law in self.touching)
 
     @property
     def frictions(self) -> list[float | None]:
-        """The coefficients of friction of contact and of each pair of touching parts, None without."""
+        """The coefficients of friction of contact and of each pair of touching parts, None where it has none."""
         own = [self.contact.friction] if self.contact else []
         return [*own, *(law.friction for law in self.touching)]
 

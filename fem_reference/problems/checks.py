@@ -24,18 +24,18 @@ from fem_reference.problems.body import (
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
-SAME = 1e-6  # of the body's size: the greatest difference of two regions that prescribe the same
-_FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume counts as flat
+SAME = 1e-6  # share of the body's size by which two regions that prescribe the same may differ
+_FLAT = 1e-9  # a cell counts as flat below this share of its longest edge cubed
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
-_MOST_CELLS = 10_000_000  # of a box
+_MOST_CELLS = 10_000_000  # cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, and 16 digits do not hold both
+_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, too much for 16 digits
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
-    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that
-    it names exist, its constraints can be distinguished, followed and solved, and quadrature of that degree suits the element.
+    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that it
+    needs exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -172,7 +172,7 @@ def _check_volumes(mesh: Cells) -> None:
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
     flat = np.flatnonzero(~(np.abs(np.linalg.det(edges)) > _FLAT * longest**3))
     if len(flat):
-        raise InputError(f"mesh.cells[{flat[0]}]", "a cell without volume", "cells that have one")
+        raise InputError(f"mesh.cells[{flat[0]}]", "a cell without volume", "cells with a volume")
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
@@ -229,10 +229,9 @@ def _check_needs(body: Body) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where a part of the body has no law of a kind (``regions.check``), the normal of a law is along fibres, a
-    tendon or friction is beside tension at rest, two regions of its surface prescribe different exact displacements at shared
-    places, or a path of motion cannot be followed. Displacements are compared at all frames, all stops, and the middles between
-    them.
+    """Raise InputError where a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
+    friction is combined with tension at rest, two regions of its surface prescribe different exact displacements at shared places,
+    or a path of motion cannot be followed. Displacements are compared at all frames, all stops, and the middles between them.
     """
     regions.check(body)
     directions.check_normals(body)
@@ -268,7 +267,7 @@ def _shared(mesh: Cells, one: str, other: str) -> Floats:
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:
-        facets = np.sort(mesh.facets[name].astype(np.int64), axis=1)  # a product of two indices may need it
+        facets = np.sort(mesh.facets[name].astype(np.int64), axis=1)  # 64 bits for products of two indices
         pairs = facets[:, list(combinations(range(facets.shape[1]), 2))]
         return np.asarray(pairs[..., 0] * count + pairs[..., 1])
 

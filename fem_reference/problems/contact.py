@@ -13,10 +13,9 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR, signed_distances
 from fem_reference.geometry.skins import Skin
 
-# The largest share of the unattached surface that may be exempt from contact; half of that brings a warning.
+# The largest share of the unattached surface that may be exempt from contact; there is a warning above half of it.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: between four of them, 0.71 from each, a thinner one
-# would pass.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone would pass between four points, 0.71 from each.
 _THINNEST = 0.75
 # Above this share of a bone's half thickness, the side to which an overlap at rest is to be removed is not defined.
 _MIDDLE = 0.95
@@ -35,22 +34,23 @@ class ContactBone:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Contact of bones, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
-    pressure depends on the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm],
-    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
-    ``stiffness``: k [MPa/mm]; under pressure p a surface penetrates by p / k.
+    """Contact of bones with any amount of sliding. ``on``: the name of a region of facets, or a skin. The pressure depends on the
+    gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and
+    ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm]; under pressure p a
+    surface penetrates by p / k.
 
     ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: it causes no pressure at the first, and
     counts in full from the second on.
 
     ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
-    there, with the pressure that balances the tension (``effects.in_situ``); later only the change of its gap counts.
+    there, with the pressure that balances the tension (``effects.in_situ``); later only the change of the gap of such a point
+    counts.
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
-    k, and slides under the friction times the pressure.
+    k, and slides at a traction of ``friction`` times the pressure.
 
-    ``parts``: of several bodies solved as one, the name of each, its first point of the skin, and the one after its last: forces
-    are then reported by body too.
+    ``parts``: of several bodies solved as one, the name of each, and the first point of its part of the skin and the one after the
+    last; forces are then also reported by body.
     """
 
     on: str | Skin
@@ -62,7 +62,7 @@ class ContactLaw:
     parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
@@ -91,8 +91,8 @@ def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm]
-    from their ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, and ``least`` [mm].
+    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
+    ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, at least ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)
@@ -113,7 +113,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
-        want = f"less: its middle is {half:.3g} mm deep, where no side is nearer than another"
+        want = f"less: its middle is {half:.3g} mm deep, and no side is nearer than another there"
         raise InputError(f'bone "{name}"', got, want)
     return nearest
 

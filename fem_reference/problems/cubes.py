@@ -12,7 +12,7 @@ from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats
 
 FREE = None  # an axis along which no stress acts
-# The stress that may remain on free sides: a share of the greatest stress, and for rounding a share of the bulk modulus.
+# The stress that may remain on free sides: a share of the greatest stress, plus, for rounding, a share of the bulk modulus.
 _LEFT, _ROUNDING = 1e-8, 1e-13
 
 
@@ -29,12 +29,12 @@ class CubeState:
         return np.diag(self.F)
 
     def poisson_ratio(self, loaded: int, axis: int) -> float:
-        """Minus the logarithmic strain along ``axis`` over that along the ``loaded`` one."""
+        """Minus the logarithmic strain along ``axis``, divided by that along the axis ``loaded``."""
         return float(-np.log(self.stretches[axis]) / np.log(self.stretches[loaded]))
 
 
 def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats:
-    """The derivative (3, 3) [MPa] by ``F`` (3, 3) of the energies of the effects ``acting`` in full, exact up to rounding."""
+    """The derivative (3, 3) [MPa] of the energies of ``acting`` effects with respect to ``F`` (3, 3), exact up to rounding."""
     jets = variables(F.reshape(9, 1), curved=False)
     rows = [jets[3 * i : 3 * i + 3] for i in range(3)]
     energy = total_energy([(one, 1.0) for one in acting], State(F=rows, fibre=tuple(fibre), functions=JET_FUNCTIONS))
@@ -42,11 +42,11 @@ def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats
 
 
 def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: Floats) -> CubeState:
-    """The state of a cube at ``stretches`` along x, y and z, ``FREE`` where no stress acts; at least one is given.
+    """The state of a cube at ``stretches`` along x, y and z, ``FREE`` where no stress acts; at least one of them is given.
 
     Fibres lie in the plane of x and y. Where they are at an angle to the load, the cube is sheared (lines along y lean towards x)
-    until no shear stress acts: it is in tension or compression along x alone, as far away from plates, which would prevent the
-    shear. ArithmeticError where no such state is found.
+    until no shear stress acts: it is in tension or compression along x alone, like material far from the plates of a testing
+    machine, which would prevent the shear. ArithmeticError where no such state is found.
     """
     if not all(one is FREE or 0 < one < np.inf for one in stretches):
         raise InputError("stretches", stretches, "numbers above zero, or FREE")

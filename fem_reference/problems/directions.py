@@ -1,4 +1,4 @@
-"""Checks of the fibre directions of a body, and of what laws turn them about."""
+"""Checks of the fibre directions of a body, and of the normals about which laws turn them."""
 
 import math
 
@@ -11,7 +11,7 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.problems.body import Body
 
 _UNIT = 1e-6  # the tolerance on the length of a unit vector
-_LEAST = 1.0  # [deg] between a normal and the fibres, whose directions in a mesh are not exact
+_LEAST = 1.0  # the least angle [deg] between a normal and the fibres, which are not exact in a mesh
 
 
 def check_unit(fibre: Directions, places: Floats) -> None:

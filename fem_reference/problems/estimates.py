@@ -30,28 +30,27 @@ from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
-# The change by an effect that is negligible, in sizes of the scene's tetrahedra, or in the travel of its surface where
-# that is less: error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of the
-# latter; those of fibre lengths and volumes are tighter where only these change.
+# An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
+# the surface where that is less. Error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of
+# the latter; those of fibre lengths and volumes are tighter where only these change.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the other effects, which is at least that of a strain of
-# rounding.
+# The negligible change of stress by an effect, relative to the stress of the other effects, and the least strain assumed for that.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 # The error of the guessed position of a point, as a share of its path past a bone. In `hip_flexion` it is 0.83.
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
 _PLACES = 6000  # contact points, sampled for their distance to bones
-_ALONG = 0.7  # the share of a direction in the plane of triangles that are sampled for the stretch along it
-_STILL = 1e-6  # [mm] of motion by rounding
+_ALONG = 0.7  # triangles are sampled for the stretch along a direction whose share in their plane is above this
+_STILL = 1e-6  # [mm], motion that is only rounding
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 
 @dataclass(frozen=True)
 class Decision:
     """Decision whether an effect is ``needed``, by its ``indicator`` (None: part of the material) and the allowed values
-    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where estimates did;
-    ``listed``: the effect acts in any case. ``of``: the muscle of several in which alone it acts.
+    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where the estimates
+    did; ``listed``: the effect acts in any case. ``of``: the one of several muscles in which it acts.
     """
 
     effect: Effect
@@ -65,7 +64,7 @@ class Decision:
 
     @property
     def title(self) -> str:
-        """The title of the effect, after the name of its muscle where it acts in that alone."""
+        """The title of the effect, after the name of the muscle if it acts in only one of several."""
         return f"{self.of}: {self.effect.title}" if self.of else self.effect.title
 
     @property
@@ -92,7 +91,7 @@ class Decision:
 
     @property
     def _because(self) -> str:
-        """The quantities that decided: those above their allowed value, or all where none is."""
+        """The quantities that decided: those above their allowed values, or all where none is."""
         assert self.indicator is not None
         estimate, stress, most = self.indicator.estimate, 1e3 * self.indicator.stress, 1e3 * self.stress_bound
         said = [
@@ -167,14 +166,14 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
 
 
 def _instants(case: MuscleCase) -> tuple[float, ...]:
-    """All frame numbers, and the knots of ramps between them."""
+    """All frame numbers, and the knots of ramps within their range."""
     knots = [knot.frame for effect in case.effects if isinstance(effect, Ramped) for knot in effect.ramp]
     first, last = case.frames.first, case.frames.last
     return tuple(sorted({*map(float, case.numbers), *(knot for knot in knots if first <= knot <= last)}))
 
 
 def _shear(case: MuscleCase, rest: Setup) -> float:
-    """The shear modulus at rest [MPa] of the stored energies, without fibres; where regions differ, that of the softest place."""
+    """The shear modulus at rest [MPa] of the stored energies, without fibres; that of the softest place where regions differ."""
     stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
     laws = [(one, 1.0) for one in stored]
     isotropic = [(one, 1.0) for one in stored if not one.needs]
@@ -187,7 +186,7 @@ def _shear(case: MuscleCase, rest: Setup) -> float:
 
 
 def _tension(case: MuscleCase) -> float:
-    """The stress of all fibres at their rest length [MPa], the mean over the frames, without those of regions."""
+    """The stress of all fibres at their rest length [MPa], averaged over the frames, without fibres that act in regions only."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     pulling = [one for one in pulling if not one.region]
     return sum(
@@ -217,7 +216,7 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
 
 def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. A
-    hundredth of its area at either extreme is left out, as it may be single triangles at a rim.
+    hundredth of the surface's area at either extreme is left out, as that may be single triangles at a rim.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0
@@ -237,7 +236,7 @@ def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[floa
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)
-    gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=2) - off  # to its box
+    gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=2) - off  # the gap to the box around the bone
     some = gap < _FELT
     if some.any():
         gap[some] = distance(bone, local[some]) - off[some]

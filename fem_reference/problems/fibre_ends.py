@@ -1,4 +1,4 @@
-"""The ends of a muscle's fibres: the attachment that each belongs to, its distance from that, and the area that they cover."""
+"""The ends of a muscle's fibres: the attachment to which each belongs, its distance from that, and the area that ends cover."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
-# The greatest distance [mm] from its attachment at which an end reaches it: so near, the muscle is practically attached.
+# The greatest distance [mm] from its attachment at which an end counts as reaching it: so near, the muscle is practically attached.
 REACHES = 2.0
 SIDES = ("first", "last")  # ends of a fibre
 
@@ -22,11 +22,11 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class FibreEnds:
-    """The first and the last end of k fibres: ``by`` (k, 2), the index of the attachment in ``attached`` that each belongs to, its
-    ``distance`` (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that; ``covered`` (a,): the
-    share of the area of each attachment that is within the mean spacing of fibres, sqrt(area / k), of an end that belongs to it.
+    """The first and the last end of k fibres: ``by`` (k, 2), the index in ``attached`` of the attachment of each, its ``distance``
+    (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that area; ``covered`` (a,): the share
+    of the area of each attachment that is within the mean spacing of fibres, sqrt(area / k), of an end that belongs to it.
 
-    A fibre whose end does not reach its attachment continues as the tendon of that, where it has one.
+    A fibre whose end does not reach its attachment continues as the tendon of the attachment, where that has one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -58,19 +58,19 @@ class FibreEnds:
         return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
-        """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 without."""
+        """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 for none."""
         lengths = np.linalg.norm(self.taken(self.tendons, frame) - ends, axis=2)
         return np.asarray(np.where(np.isnan(self.tendons[:, :, 0]), 0.0, lengths).sum(axis=1))
 
     def named(self, fibre: int, side: int) -> str:
-        """An end in words."""
+        """The name of an end in messages."""
         tied = " by its tendon" if np.isfinite(self.tendons[fibre, side, 0]) else ""
         return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}{tied}"
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """Numbers of ends: all, those that continue as a tendon and those beside their attachment, these with their names; and the
-        covered share of each attachment [%].
+        """The numbers of all ends, of those that continue as a tendon, and of those beside their attachment, with the names of the
+        latter; and the covered share of each attachment [%].
         """
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
@@ -92,13 +92,13 @@ class FibreEnds:
 
 
 def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:
-    """The first and the last points (k, 2, 3) of ``lines`` at rest, or where their ``points`` (n, 3) are."""
+    """The first and the last points (k, 2, 3) of ``lines`` at rest, or with their ``points`` (n, 3) given."""
     at = lines.points if points is None else points
     return np.stack([at[lines.offsets[:-1]], at[lines.offsets[1:] - 1]], axis=1)
 
 
 def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]:
-    """The mean length of ``lines`` at rest with the straight tendons of their ``ends`` [mm], and the facts of these."""
+    """The mean length of ``lines`` at rest with the straight tendons of their ``ends`` [mm], and the facts on these ends."""
     if ends is None:
         return {"fibre_length_mean_mm": float(lines.lengths().mean())}
     tendons = np.linalg.norm(ends.tendons - ends_of(lines), axis=2)
@@ -106,11 +106,11 @@ def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]
 
 
 def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
-    """The ends of the ``fibres`` of a muscle by its attachments and the parts that they exempt from contact, None without any.
+    """The ends of the ``fibres`` of a muscle from its attachments and the parts that these exempt from contact; None without any.
 
-    A fibre runs from bone to bone: of the pairs of attachments to two bones, its ends belong to that with the least sum of
-    distances, so that a short fibre beside its origin does not belong to the origin twice. Where one bone has all attachments,
-    each end belongs to the nearest.
+    A fibre runs from bone to bone: among the pairs of attachments to two bones, its ends belong to the pair with the least sum of
+    distances, so that a short fibre beside its origin does not belong to the origin twice. Where one bone has all attachments, each
+    end belongs to the nearest.
     """
     if not attached:
         return None

@@ -12,7 +12,7 @@ from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Kind, facet_corners, reference_nodes
 
-# The shares of a cell's corners in the nodes of its parts are multiples of one over this.
+# The shares of a cell's corners in the nodes of its parts are multiples of 1 over this number.
 _SHARES = 64
 
 
@@ -28,8 +28,8 @@ class OfParts:
 
 
 def finer(body: Body) -> tuple[Body, Ints]:
-    """The ``body`` with each cell cut into eight, and the number (n,) of each point of ``body`` in it, -1 for a point of no cell.
-    The shape stays that of the coarser cells: no surface gets smoother.
+    """The ``body`` with each cell cut into eight, and the number (n,) in the new body of each point of ``body``, -1 for a point of
+    no cell. The shape stays that of the coarser cells: no surface gets smoother.
     """
     mesh, shared = _cut(body.mesh)
 
@@ -79,15 +79,15 @@ def _linear(kind: Kind, places: Floats) -> Floats:
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The nodes' polynomials (q, k), 1 at their own node and 0 at others, at ``places`` (q, 3) in the cell."""
+    """The values (q, k) of the nodes' polynomials, each 1 at its own node and 0 at all others, at ``places`` (q, 3) in the cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes are
-    equal where the same corners have the same ``shares`` (8, k, c).
+    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Two nodes
+    are the same where the same corners have the same ``shares`` (8, k, c).
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)
@@ -116,7 +116,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 
 
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
-    """The skin with each point in the nearest part of its cell: that of straight tetrahedra where its least share is greatest."""
+    """The skin with each point in the nearest part of its cell: of straight tetrahedra, that with the greatest least share."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
     places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
     inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])

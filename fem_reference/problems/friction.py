@@ -22,8 +22,8 @@ def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
 
 
 class Returned(NamedTuple):
-    """Traction of n points over their elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives ``by_slip`` (n,) by the
-    length of the elastic slip and ``by_limit`` (n,) by the limit of the traction.
+    """Traction of n points over their elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives with respect to the length of
+    the elastic slip, ``by_slip`` (n,), and the limit of the traction, ``by_limit`` (n,).
     """
 
     stiffness: Floats
@@ -32,7 +32,7 @@ class Returned(NamedTuple):
 
 
 def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
-    """The traction of a spring of ``stiffness`` k [MPa/mm] by an elastic ``slip`` s (n,) [mm], up to a ``limit`` L (n,) [MPa]:
+    """The traction of a spring of ``stiffness`` k [MPa/mm] at an elastic ``slip`` s (n,) [mm], up to a ``limit`` L (n,) [MPa]:
     ``min(k s, L)``, by return mapping (Giannakopoulos 1989, doi 10.1016/0045-7949(89)90175-4).
 
     >>> returned(np.array([0.1, 0.3]), np.array([0.4, 0.4]), 2.0).stiffness * [0.1, 0.3]
@@ -45,8 +45,8 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The share (n,) of a straight path that lies within contact, where the gap falls from ``before`` (n,) [mm], at ``felt`` [mm]
-    or more, to ``gap`` (n,), below that; and its derivative (n,) by the gap.
+    """The share (n,) of a straight path that lies within contact, where the gap falls from ``before`` (n,) [mm], which is at least
+    ``felt`` [mm], to ``gap`` (n,), which is below; and the derivative (n,) of that share in ``gap``.
     """
     whole = before - gap
     return (felt - gap) / whole, (felt - before) / whole**2

@@ -14,9 +14,9 @@ from fem_reference.problems.setup import Bone, Setup
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A guess of the path of ``points`` (n, 3), which follow ``bones`` by ``weights`` (n, b): the inverse distances to their
-    attachments, so that the muscle between two of them stays straight, as under tension; the inverse distances to the bones
-    where nothing is attached.
+    """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b): the inverse distances to the
+    attachments of each bone, so that the muscle between two of them stays straight, as under tension; or, where nothing is
+    attached, the inverse distances to the bones.
     """
 
     points: Floats
@@ -46,8 +46,8 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed sideways of an ``axis`` (3,), jump of velocity and acceleration of a guess, as root mean squares
-    over its points, by frame numbers. The velocity jumps where it changes more than before and after.
+    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, each the root
+    mean square over its points and per frame number. The velocity jumps where it changes much more than it usually does.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -62,7 +62,7 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 def strain(points: Floats, moved: Floats) -> float:
     """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976, doi
-    10.1107/S0567739476001873), root mean square, over that of the distances from the middle; 1 at most.
+    10.1107/S0567739476001873), root mean square, divided by that of the distances from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
     left, _, right = np.linalg.svd(now.T @ rest)
@@ -81,7 +81,7 @@ def centres(rest: Setup) -> list[Floats]:
 
 
 def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
-    """The distance (f,) [mm] between the middles of the first and the last attachment, by frame; empty without two."""
+    """The distance (f,) [mm] between the middles of the first and the last attachment, by frame; empty without two attachments."""
     if len(rest.attached) < 2:
         return np.zeros(0)
     middles = centres(rest)
@@ -90,7 +90,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """The effect of the bones' motion on the muscle, in a sentence; empty where it is not attached twice."""
+    """The effect of the bones' motion on the muscle, in a sentence; empty where the muscle is not attached twice."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""
@@ -102,7 +102,7 @@ def described_motion(rest: Setup) -> str:
 
 
 def axis_of(rest: Setup) -> Floats:
-    """The direction (3,) from the first attachment to the last; 0 without two."""
+    """The direction (3,) from the first attachment to the last; 0 without two attachments."""
     if len(rest.attached) < 2:
         return np.zeros(3)
     middles = centres(rest)
@@ -110,8 +110,8 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The deviation [mm] of the axis from the straight line between two attachments: that at rest in the middle third, that of
-    bending by bones that turn, and a twentieth of the travel, as a sideways shift bends in two waves, which are stiffer.
+    """The deviation [mm] of the axis from the straight line between two attachments: the sum of that at rest in the middle third,
+    that of bending by bones that turn, and a twentieth of the travel (a sideways shift bends it into two waves, which are stiffer).
     """
     if len(rest.attached) < 2:
         return 0.0
@@ -130,12 +130,12 @@ def turn(rest: Setup, frame: float) -> float:
 
 
 def length_of(rest: Setup) -> float:
-    """The length [mm] from the first attachment to the last, or of the whole muscle without two."""
+    """The length [mm] from the first attachment to the last, or of the whole muscle without two attachments."""
     middles = centres(rest) or [np.zeros(3)]
     return float(np.linalg.norm(middles[0] - middles[-1])) or diagonal(rest.surface.points)
 
 
 def thickness_of(rest: Setup) -> float:
-    """The thickness [mm] of a plate of its volume and area."""
+    """The thickness [mm] of a plate with the volume and the area of the muscle."""
     points, triangles = rest.surface.points, rest.surface.triangles
     return 2 * enclosed_volume(points, triangles) / float(triangle_areas(points, triangles).sum())

@@ -1,4 +1,4 @@
-"""Several bodies joined to one, each a separate piece of its mesh, between which there may be contact."""
+"""Several bodies joined into one, each a separate piece of its mesh; the pieces may be in contact."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -34,13 +34,13 @@ class Span:
 
 
 def called(piece: str, name: str) -> str:
-    """The name in the joined body of a part of a ``piece`` with a ``name`` there."""
+    """The name, in the joined body, of the part that has a ``name`` in its ``piece``."""
     return f"{piece} {name}"
 
 
 @dataclass(frozen=True, eq=False)
 class DirectionsByPiece:
-    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; along x in pieces without fibres."""
+    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; along x in pieces that have none."""
 
     ranges: tuple[Range, ...]
     of: tuple[Directions | None, ...]
@@ -57,7 +57,7 @@ class DirectionsByPiece:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """The share of points in a ``region``, or outside of it; 1 without one."""
+    """The share of points in a ``region``, or outside of it; 1 where no region is named."""
 
     region: Region | None = None
     outside: bool = False
@@ -71,7 +71,7 @@ class Share:
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
     """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the whole. Effects that all bodies have
-    act everywhere, others in the cells of their bodies. InputError where bodies differ in what must be the same.
+    act everywhere, other effects act in the cells of their bodies. InputError where bodies differ in what must be the same.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -104,7 +104,7 @@ def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Bod
 
 
 def _frames(bodies: Mapping[str, Body], touching: tuple[Touching, ...]) -> tuple[float, ...]:
-    """The frames of all, from before the first where an overlap at rest is removed."""
+    """The frames of the bodies, from the earliest on at which the removal of an overlap at rest begins."""
     found = min((one.frames for one in bodies.values()), key=lambda frames: frames[0])
     begin = min((law.relaxed[0] for law in touching if law.relaxed is not None), default=found[0])
     return (begin, *found) if begin < found[0] else found
@@ -113,7 +113,7 @@ def _frames(bodies: Mapping[str, Body], touching: tuple[Touching, ...]) -> tuple
 def _acting(
     bodies: Mapping[str, Body], ranges: Mapping[str, Range]
 ) -> tuple[tuple[Effect, ...], dict[str, Region], dict[str, Range]]:
-    """The effects of all bodies, and the regions in which those of one act with their ranges of cells."""
+    """The effects of all bodies, and the regions in which effects of one body act, with their ranges of cells."""
     effects, regions, within = list[Effect](), dict[str, Region](), dict[str, Range]()
     for name, body in bodies.items():
         for effect in body.effects:
@@ -141,7 +141,7 @@ def _acting(
 
 
 def _check_pressure(bodies: Mapping[str, Body]) -> None:
-    """Raise InputError where some bodies have an unknown, such as the pressure, that others lack."""
+    """Raise InputError where one body has an unknown, such as the pressure, that another lacks."""
     brought = {name: {one for effect in body.effects for one in effect.unknowns} for name, body in bodies.items()}
     if len({frozenset(one) for one in brought.values()}) > 1:
         got = "; ".join(f"{name}: {', '.join(sorted(one)) or 'none'}" for name, one in brought.items())
@@ -149,7 +149,7 @@ def _check_pressure(bodies: Mapping[str, Body]) -> None:
 
 
 def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iterator[Prescribed]:
-    """All prescribed displacements, by the names that they have in the whole."""
+    """All prescribed displacements, with the names that they have in the joined body."""
     for name, body in bodies.items():
         for entry in body.prescribed:
             on = called(name, entry.on) if isinstance(entry.on, str) else _moved(entry.on, ranges[name][0])
@@ -157,12 +157,12 @@ def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iter
 
 
 def _moved(skin: Skin, first: int) -> Skin:
-    """The ``skin`` of cells that begin with the one of number ``first``."""
+    """The ``skin`` with its cells renumbered to begin with number ``first``."""
     return replace(skin, cells=skin.cells + first)
 
 
 def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> ContactLaw | None:
-    """The contact of all bodies with bones, on the points of all; None without."""
+    """The contact of all bodies with bones, on the points of all; None where there is none."""
     laws: dict[str, Any] = {name: one.contact for name, one in bodies.items() if one.contact is not None}
     if not laws:
         return None

@@ -12,8 +12,8 @@ from fem_reference.problems.muscle import MuscleProblem
 def external_load(
     problem: MuscleProblem, frame: float, by: Floats | None = None, velocity: Floats | None = None
 ) -> Wrench | None:
-    """The sum of the external loads at a frame, for displacement and velocity of nodes as in ``Displaced``; None where it is not
-    known from these alone. Without displacements its moment is NaN.
+    """The sum of the external loads at a frame, from the displacement and velocity of nodes as in ``Displaced``; None where these
+    alone do not determine it. Its moment is NaN without displacements.
     """
     shape = Displaced(replace(problem.mesh, facets=problem.body.mesh.facets), by, velocity)
     known = list[Wrench]()

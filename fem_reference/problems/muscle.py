@@ -60,19 +60,19 @@ from fem_reference.problems.tendons import pulling
 from fem_reference.problems.touching import with_itself
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
-RELAXING = 10  # frame numbers before the first over which an overlap at rest is removed
+RELAXING = 10  # the number of frame numbers before the first over which an overlap at rest is removed
 
 
 def kept_meshes() -> Path | None:
-    """The folder of stored tetrahedra; it may be deleted. None: they are made each time."""
+    """The folder of stored tetrahedra, which may be deleted; None where they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleProblem(Setup):
-    """A set-up filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres. ``fibre``: the fibre
-    direction at any point, where an effect needs it; ``skin``: the contact surface, where there is contact; ``attached_skins``:
-    the points of springs, by attachment; ``mesh_facts``: facts on the mesh; ``seconds``: the time of meshing.
+    """A set-up filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres. ``fibre``: the fibre direction
+    at any point, where an effect needs it; ``skin``: the contact surface, if there is contact; ``attached_skins``: the points of
+    springs, by attachment; ``mesh_facts``: facts on the mesh; ``seconds``: the time that meshing took.
     """
 
     mesh: TetMesh
@@ -98,7 +98,7 @@ class MuscleProblem(Setup):
 
     @property
     def rest(self) -> AtRest:
-        """All shapes that its frames move."""
+        """All rest shapes that the frames move."""
         return AtRest(self.surface, self.fibres, self.mesh, self.directions)
 
     @cached_property
@@ -122,7 +122,7 @@ class MuscleProblem(Setup):
         body = Body(cells, acting, tuple(prescribed), self.frames, self.fibre, regions=self.regions)
         body = replace(body, interval=self.interval, start=self.start, touching=with_itself(self.effects, "free"))
         if self.contact is not None:
-            assert self.skin is not None  # built with the effect
+            assert self.skin is not None  # made wherever the effect acts
             body = _among_bones(body, self.bones, self.skin, self.contact)
         check_agreement(body)
         return body
@@ -211,7 +211,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm] with the facets of attachments: up to their rims where the mesher keeps them, else below."""
+    """Tetrahedra of a ``size`` [mm] with the facets of attachments: within their rims where the mesher keeps these, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
@@ -256,14 +256,14 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The body of a ``bone`` with a closed form; None where it is a surface in a file."""
+    """The obstacle of a ``bone`` with a closed form; None where the bone is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the
-    number of its vertices more than ``far`` [mm] from attached facets: islands that tets do not resolve.
+    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the number of its
+    vertices that are more than ``far`` [mm] from attached facets: islands that the tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
@@ -286,7 +286,7 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
-    """The body with its bones in contact; where they overlap it at rest, it is relaxed before the first frame, unless in situ."""
+    """The body with its bones in contact; an overlap at rest is removed before the first frame, unless the body is in situ."""
     pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
     nearest = min((nearest_at_rest(bone.name, bone.shape, points) for bone in pressing), default=np.inf)

@@ -1,4 +1,4 @@
-"""Several muscles of one scene: each as a set-up and a problem of its own, and all as one body with contact between them."""
+"""Several muscles of one scene: each with its own set-up and problem, and all together as one body with contact between them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -67,7 +67,7 @@ class MusclesSetup:
 @dataclass(frozen=True, eq=False)
 class MusclesProblem:
     """The ``problems`` of several muscles by name, solved as one body, with contact of a ``law`` between the ``pairs``, if any.
-    ``apart``: True where muscles must not cross: contact acts between them, or was left out as they do not come near.
+    ``apart``: True where muscles must not cross: contact acts between them, or was left out as they stay apart.
     """
 
     problems: dict[str, MuscleProblem]
@@ -106,7 +106,7 @@ class MusclesProblem:
 
     @cached_property
     def rest(self) -> AtRest:
-        """All shapes that its frames move, those of one muscle after those of another."""
+        """All rest shapes that the frames move, muscle after muscle."""
         found = list(self.problems.values())
         counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]
@@ -119,7 +119,7 @@ class MusclesProblem:
 
     @property
     def muscle(self) -> MuscleProblem:
-        """No single muscle: InputError."""
+        """InputError, as there is no single muscle."""
         raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
 
     def write_meshes(self, folder: Path) -> None:
@@ -148,7 +148,7 @@ class MusclesProblem:
 
     @cached_property
     def spans(self) -> tuple[Span, ...]:
-        """The parts of joined arrays that are of each muscle."""
+        """For each muscle, its parts of the joined arrays."""
         found = self.problems.values()
         counts = [
             (len(one.surface.points), len(one.fibres.points), len(one.mesh.points), len(one.mesh.tets)) for one in found
@@ -193,8 +193,8 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
 
 
 def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
-    """A lower bound [mm] of the distance of each two muscles over all frames, also where they bulge, bones press them or loads
-    act; without these where the motion of the bones alone may bring them within ``felt`` [mm].
+    """A lower bound [mm] of the distance between each two muscles over all frames. It allows for bulging, the pressure of bones and
+    loads, unless the motion of the bones alone may bring the two within ``felt`` [mm].
     """
     parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
     beyond = cache(lambda name: _beyond(parts[name], muscles[name]))
@@ -217,15 +217,15 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
 
 
 def clearance(one: Setup, other: Setup) -> float:
-    """A lower bound [mm] of the distance over all frames of two muscles that only follow the bones: that at rest, less the greatest
-    displacement of either with a bone. Below 0 where they may cross.
+    """A lower bound [mm] of the distance, over all frames, between two muscles that only follow the bones: the distance at rest
+    less the greatest displacement of each with a bone. It is below 0 where they may cross.
     """
-    between = max(spacing(one.surface), spacing(other.surface))  # vertices
+    between = max(spacing(one.surface), spacing(other.surface))  # their distances are between vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
 
 
 def _apart(one: Surface, other: Surface) -> float:
-    """The distance [mm] of two surfaces, by the vertices of each; 0 where they cross."""
+    """The distance [mm] between two surfaces, from the vertices of each; 0 where they cross."""
     if len(crossings(one, other)):
         return 0.0
     found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]
@@ -244,14 +244,14 @@ def _travel(rest: Setup) -> float:
 
 
 def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
-    """Frame numbers at which the motion of a bone is sampled: ``frames``, its keyframes among these, and some between each two."""
+    """Frame numbers at which the motion of a bone is sampled: ``frames``, its keyframes among these, and some in between."""
     assert bone.motion is not None  # called for moving bones only
     stops = sorted({*map(float, frames), *(one for one in bone.motion.frames if frames[0] <= one <= frames[-1])})
     return np.interp(np.linspace(0, len(stops) - 1, _BETWEEN * (len(stops) - 1) + 1), np.arange(len(stops)), stops)
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """Decisions on each effect: one of all muscles is needed where one needs it, contact between them where they come near."""
+    """Decisions on each effect: one of all muscles is needed if any muscle needs it, contact between them if they come near."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
@@ -265,7 +265,7 @@ def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
 
 
 def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> Decision:
-    """The decision on contact between muscles, by the least clearance of two."""
+    """The decision on contact between muscles, by the least clearance between any two."""
     known = estimates(case.parts[0], next(iter(rest.muscles.values())))
     gaps = _gaps(case, rest.muscles, effect.smoothing)
     nearest = min(gaps, key=lambda pair: gaps[pair])
@@ -276,7 +276,7 @@ def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> De
 
 
 def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
-    """The case with the effects that are needed, of all muscles and of each."""
+    """The case with the needed effects, both those of all muscles and those of each."""
     kept: list[Any] = [one.effect for one in found if one.needed]
     own = tuple(
         one.model_copy(

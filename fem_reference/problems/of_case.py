@@ -27,14 +27,14 @@ from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
 
-# A case before meshing, with all that judging its runs needs; and its problem, as a solver receives it.
+# The set-up of a case before meshing, which suffices to judge its runs; and its problem, as a solver receives it.
 CaseSetup = Setup | MusclesSetup | FieldProblem
 MechanicalProblem = MuscleProblem | MusclesProblem
 CaseProblem = MechanicalProblem | FieldProblem
 
 
 def mechanical(built: CaseProblem) -> MechanicalProblem | None:
-    """The problem, if it is of one muscle or several; None for a field."""
+    """The problem ``built``, if it has one muscle or several; None for a field."""
     return None if isinstance(built, FieldProblem) else built
 
 
@@ -54,7 +54,7 @@ def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalPr
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on the effects that a case needs, with reasons, from the set-up ``rest`` or a new one; none for a field."""
+    """Decisions on the effects that a case needs, with reasons, from the set-up by ``rest`` or a new one; empty for a field."""
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -66,7 +66,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
 
 
 def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """Facts on the contents of a case, as words and numbers by name."""
+    """Facts on the contents of a case by name, as words and numbers."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return _facts_of_muscle(setup, case)
     if isinstance(case, MusclesCase) and isinstance(setup, MusclesSetup):
@@ -154,7 +154,7 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, where it leaves them to be determined (as ``explained``), and the ``decisions``."""
+    """The case with the effects that it needs, where it leaves them to be determined, by the decisions that ``explained`` gives."""
     if not isinstance(case, MuscleCase | MusclesCase) or case.choice == "listed":
         return case
     found = explained(case, rest)
@@ -167,7 +167,7 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that a case omitted, from its set-up and its problem; None where it omitted none."""
+    """The watch for effects that a case omitted, from its set-up and its problem; None where the case omitted none."""
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle
@@ -175,7 +175,7 @@ def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watc
 
 
 def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
-    """The case with the effects that were ``found`` to matter."""
+    """The case with the effects that the decisions ``found`` need."""
     for one in found:
         log.info("%s: %s", case.name, one)
     new = {id(one.effect): one for one in found}

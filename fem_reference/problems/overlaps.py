@@ -1,5 +1,5 @@
-"""Parts of the surface of a body that may touch: their overlap at the start, as the search for contact sees only what is shallow,
-and the skin beyond their rims.
+"""Parts of the surface of a body that may touch: their overlap at the start, which the search for contact sees only if it is
+shallow, and the skin beyond their rims.
 """
 
 from functools import lru_cache
@@ -14,19 +14,19 @@ from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
-_SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # a facet with four corners in two triangles
+_SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # cuts a facet with four corners into two triangles
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap at the start, at least."""
+    """A lower bound of the depth [mm] to which the parts of a ``law`` overlap at the start."""
     points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     return overlap_at(body.mesh, law, points)
 
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm], at least: the greatest of a
-    corner of either below the skin of the other's piece, and of facets that cross; of a part with itself, of the middle of a facet
-    within the whole skin, and of facets of the part that cross this. Curved facets count by their corners, less what they bulge.
+    """A lower bound of the depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]: the greatest
+    depth of a corner of either part below the skin of the other's piece, and of facets that cross; for a part with itself, of the
+    middle of a facet within the whole skin, and of facets that cross it. Curved facets count by corners, less their bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
@@ -49,8 +49,8 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
 
 
 def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
-    """The depth [mm] to which a surface ``now`` goes through itself, at least, and its place (3,), away from vertices that do so at
-    ``rest``; triangles that cross show less than a side that is within another, which is measured where there are none at rest.
+    """A lower bound of the depth [mm] of self-penetration of a surface ``now``, and its place (3,), away from vertices with any at
+    ``rest``. Triangles that cross show less than a side that is within another, which counts too if there is none at rest.
     """
     known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
     new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]
@@ -64,19 +64,19 @@ def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
 
 @lru_cache(maxsize=8)
 def _crossing(surface: Surface) -> Ints:
-    """The vertices (k,) at which a surface goes through itself."""
+    """The vertices (k,) at which a surface penetrates itself."""
     return np.unique(surface.triangles[self_crossings(surface)])
 
 
 def longest_edge(mesh: Cells, law: Touching) -> float:
-    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are a quarter of it apart, at most."""
+    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are at most a quarter of that apart."""
     corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
     return max(float(edge_lengths(one).max()) for one in corners)
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:
-    """The facets (f, 3 or 4) of the skin around the part ``other``, on its piece, that the part ``side`` may not touch;
-    none of a part that touches itself.
+    """The facets (f, 3 or 4) of the skin around the part ``other``, on the same piece, which the part ``side`` may not touch; none
+    where a part touches itself.
     """
     mesh, facets = body.mesh, outer_facets(body.mesh)[0]
     laws = [(law.one, law.other) for law in body.touching]
@@ -87,7 +87,7 @@ def beyond_rim(body: Body, side: str, other: str) -> Ints:
 
 
 def _pieces(mesh: Cells) -> Ints:
-    """The number (n,) of the piece of each point."""
+    """The number (n,) of the piece to which each point belongs."""
     return connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(mesh.points))
 
 
@@ -98,7 +98,7 @@ def _among(facets: Ints, part: Ints) -> NDArray[np.bool_]:
 
 
 def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
-    """The facets (f, 3 or 4) of one cell each, and triangles (t, 3) of these that face outwards, with the facet (t,) of each."""
+    """The facets (f, 3 or 4) of one cell each, the outward triangles (t, 3) that they consist of, and the facet (t,) of each."""
     facets, cells = outer_facets(mesh)
     split = _SPLIT[: facets.shape[1] - 2]
     triangles, owner = facets[:, split].reshape(-1, 3), np.repeat(np.arange(len(facets)), len(split))
@@ -110,8 +110,8 @@ def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
 
 
 def _bulge(mesh: Cells, points: Floats, parts: Ints) -> float:
-    """The greatest distance [mm] of a node from its place in a straight cell with the same corners, and of a facet with four from
-    its triangles, of the cells beside the facets ``parts``.
+    """The greatest distance [mm] of a node from its place in a straight cell with the same corners, and of a facet with four
+    corners from its triangles, for the cells beside the facets ``parts``.
     """
     nodes, corners = reference_nodes(mesh.kind, mesh.degree), reference_nodes(mesh.kind, 1)
     at = points[mesh.cells[np.isin(mesh.cells[:, : len(corners)], parts).sum(axis=1) >= parts.shape[1]]]

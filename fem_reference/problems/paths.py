@@ -22,14 +22,14 @@ def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
 
 @dataclass(frozen=True)
 class Rest:
-    """No motion."""
+    """A path without motion."""
 
     def __call__(self, points: Floats, frame: float) -> Floats:  # noqa: ARG002
         """Zero, (n, 3) [mm]."""
         return np.zeros_like(points)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """No frames."""
+        """An empty sequence of frames."""
         return (), ()
 
 
@@ -78,7 +78,7 @@ class Turn:
         return np.asarray(turned - arms)
 
     def turning(self, points: Floats) -> Turning:
-        """The knots, and the angles of the point that turns most."""
+        """The knots, and the angles at these of the point that turns most."""
         _, _, along = self._arms(points)
         most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
         return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)

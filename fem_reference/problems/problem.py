@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 
 # The three problems that solvers take: a muscle, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
-# The surface of a problem without one.
+# The empty surface of a problem that has none.
 NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 
@@ -36,8 +36,8 @@ class Problem(Protocol):
 
     @property
     def frames(self) -> Sequence[float]:
-        """The requested frame numbers; the problem is at rest at the first, unless it states otherwise."""
+        """The requested frame numbers; at the first the problem is at rest, unless it states otherwise."""
 
     @property
     def rest(self) -> AtRest:
-        """The shapes that its frames move."""
+        """The rest shapes that the frames move."""

@@ -19,16 +19,16 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
-_LEAST = 0.5  # the least share of laws of a kind at a point
-# The least accepted maximum of the share in a region: it is low where the width is greater than the depth.
+_LEAST = 0.5  # the least sum of the shares of all laws of a kind at a point
+# The least accepted value of the greatest share in a region, which is low where the width exceeds the depth.
 _REACHED = 0.25
-_ROUNDED = 1e-6  # the error of a sum of shares that is one
-_SURE = 0.99  # below that the greatest share in a region is reported
-_SEEN = 1e-3  # an overlap, as a share of the volume, that is reported
+_ROUNDED = 1e-6  # the rounding error of a sum of shares
+_SURE = 0.99  # a greatest share in a region is reported if it is below this
+_SEEN = 1e-3  # an overlap is reported if its share of the volume is above this
 
 
 def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> dict[str, Region]:
-    """The regions of a case by name, in its set-up ``rest``; equal names are united. ``fill``: tetrahedra of a size [mm]."""
+    """The regions of a case by name, in its set-up ``rest``; equal names are united. ``fill`` makes tetrahedra of a size [mm]."""
     found: dict[str, list[Region]] = {}
     for i, region in enumerate(case.region):
         found.setdefault(region.name, []).append(Blended(_depth(case, i, rest, fill), region.width))
@@ -78,7 +78,7 @@ def facts(rest: Setup) -> dict[str, str]:
 
 def check(body: Body) -> None:
     """Raise InputError where an effect acts in a region that does not exist or has no points, shares are not from 0 to 1, or a part
-    of the body has no law of shape, of volume, or of the pressure unknown.
+    of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
     for i, region in named.items():
@@ -96,7 +96,7 @@ def check(body: Body) -> None:
             raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
         if (
             isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets
-        ):  # membranes know shares at corners
+        ):  # a membrane has its shares at corners
             corners = body.points_on(effect.on)
             share = State(F=(), regions=body.shares(corners, np.zeros(len(corners), int))).share(region)
         if (most := float(share.max(initial=0.0))) < _REACHED:
@@ -104,17 +104,17 @@ def check(body: Body) -> None:
             want = f"a share of {_REACHED:g} somewhere: more depth, or less width"
             raise InputError(f"effects[{i}].in", f'"{region}", {got}', want)
     laws = [effect for effect in body.effects if isinstance(effect, Energy)]
-    _check_whole("shape", [law for law in laws if law.moduli().shear], at, points)
-    _check_whole("volume", [law for law in laws if law.moduli().bulk and not law.unknowns], at, points)
+    _check_whole("isochoric", [law for law in laws if law.moduli().shear], at, points)
+    _check_whole("volumetric", [law for law in laws if law.moduli().bulk and not law.unknowns], at, points)
     _check_whole("pressure", [law for law in laws if law.unknowns], at, points)
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
-    """Raise InputError where ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of a pressure sum to 1."""
+    """Raise InputError where ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of pressure must sum to 1."""
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
     if laws and not off.max() <= 0:
         named, worst = ", ".join(law.title for law in laws), int(off.argmax())
-        got = f"laws of {kind} ({named}) with a share of {total[worst]:.3g} at {place_of(points[worst])}"
+        got = f"{kind} laws ({named}) with a share of {total[worst]:.3g} at {place_of(points[worst])}"
         want = "1 everywhere" if kind == "pressure" else f"at least {_LEAST:g} everywhere"
         raise InputError("effects", got, f'{want}: a law without "in", or one in "{REST}NAME" beside one in "NAME"')

@@ -1,12 +1,12 @@
 """Frame numbers at which load steps end, so that no step skips motion, for any frames.
 
-Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight
-line between two poses loses the direction), moves farther than the size of the body, apart from the motion that all share,
-or moves there and back by more than a fifteenth of that distance and a hundredth of the body's size.
+Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight line between
+two poses loses the sense of rotation), moves farther than the size of the body, apart from the motion that all share, or moves
+there and back by more than both a fifteenth of its distance and a hundredth of the body's size.
 
 Motions and paths of this package state the frames at which they bend and the angles by which they turn between (``turning``), so
 that this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times
-between two of them, and again where it moves far: faster motion is not seen.
+between two of them, and more often where it moves far: faster motion is not seen.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,17 +25,18 @@ from fem_reference.foundations.motion import Turning, apply
 # The greatest rotation [rad] in a load step and between two samples, and the greatest travel between two samples as a share of the
 # body's size.
 TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
-# A quarter of a circle is 1.11 times as long as its chord; a path longer than that, and by this share of the body's size, returns.
+# A quarter of a circle is 1.11 times as long as its chord. A path counts as returning if it is longer than ``_BENT`` chords and
+# exceeds the chord by ``_BACK`` times the body's size.
 _BENT, _BACK = 1.12, 0.01
 _SAMPLES, _BETWEEN = 1024, 16  # samples of an unknown motion, over all frames and between two
 _POINTS = 32  # sampled points of a region
 _MOST = 20_000  # sampled frames
-_SHORTEST = 1e-9  # share of all frames within which a long motion counts as a jump
+_SHORTEST = 1e-9  # the share of all frames within which a long motion counts as a jump
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, ``place`` in messages; ``scale``: a mere amount."""
+    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, ``place`` in messages; ``scale``: an amount only."""
 
     place: str
     at: Callable[[float], Floats]
@@ -47,16 +48,16 @@ def turning(path: object, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
     has turned by at each; None where the path does not state them.
     """
-    owner = getattr(path, "__self__", path)  # of a method
+    owner = getattr(path, "__self__", path)  # the object of a method
     if not type(owner).__module__.startswith("fem_reference."):
         return None
-    motion: Any = getattr(owner, "motion", owner)  # of a bone, which may have none
+    motion: Any = getattr(owner, "motion", owner)  # a bone has a motion, which may be None
     known = getattr(motion, "turning", None)
     return ((), ()) if motion is None else known(points) if known else None
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:
-    """The amount of an ``effect`` as a point that moves by ``size`` [mm] up to the full amount; None where it is constant."""
+    """The amount of an ``effect`` as the motion of a point, by ``size`` [mm] for the full amount; None where it is constant."""
     if type(effect).amount is Effect.amount:
         return None
     knots = effect.ramp if isinstance(effect, Ramped) and type(effect).amount is Ramped.amount else None
@@ -67,7 +68,7 @@ def moving_ramp(effect: Effect, size: float) -> Moving | None:
 
 
 def some(points: Floats) -> Floats:
-    """A sample of ``points`` (n, 3), evenly among them."""
+    """An evenly spread sample of ``points`` (n, 3)."""
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))
     return np.asarray(points[chosen])
 
@@ -89,7 +90,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """The thing that moves more from one of ``frames`` to the next than a step may, and these two frames; None without one."""
+    """The thing that moves more from one of ``frames`` to the next than a step may, and these two frames; None if none does."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):
@@ -99,13 +100,13 @@ def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> t
 
 
 def posed(place: str, pose: Callable[[float], Floats], points: Floats) -> Moving:
-    """The motion of the box around ``points`` (n, 3) [mm] by a rigid motion."""
+    """The motion of the corners of the box around ``points`` (n, 3) [mm], with a rigid ``pose``."""
     box = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, points.max(axis=0), points.min(axis=0))
     return Moving(place, lambda frame: apply(pose(frame), box), turning(pose, box))
 
 
 def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
-    """The frames of the first samples of a thing."""
+    """The frames at which a thing is sampled first."""
     first, last = frames[0], frames[-1]
     if thing.turning is None:
         count = max(_BETWEEN, -(-_SAMPLES // (len(frames) - 1)))
@@ -163,7 +164,7 @@ class _Samples:
         return max(at + 1, min(self.reach(i, at) for i in range(len(self.things))))
 
     def reach(self, i: int, at: int) -> int:
-        """The same as ``farthest``, for one thing."""
+        """The same as ``farthest``, for the thing of number ``i``."""
         turns, places = self.turns[i], self.places[i] - self.places[i][at]
         travels, lengths = ((each[i] - each[i][at]) for each in (self.travels, self.lengths))
         last = int(np.searchsorted(turns, turns[at] + TURN + 1e-6, "right")) - 1
@@ -174,7 +175,7 @@ class _Samples:
 
 
 def _places(thing: Moving, frames: Floats) -> Floats:
-    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError where that is not finite."""
+    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError where they are not finite."""
     found = np.array([thing.at(float(frame)) for frame in frames], float)
     lost = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(lost):
@@ -189,7 +190,7 @@ def _steps(places: Floats) -> Floats:
 
 
 def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
-    """The angles (m - 1,) [rad] between ``frames`` (m,): known, or the greatest of a direction from the middle to a point."""
+    """The angles (m - 1,) [rad] between ``frames`` (m,): known, or the greatest turn of a direction from the middle."""
     if thing.turning is not None:
         knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)

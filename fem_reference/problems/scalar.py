@@ -24,7 +24,7 @@ from fem_reference.scenes.scalar import Boundary, MeshFiles, ScalarCase
 
 @dataclass(frozen=True, eq=False)
 class Flux:
-    """Facets (f, 1 or 2) by their vertices, and the formula of the field's ``slope`` along their outward normal."""
+    """``facets`` (f, 1 or 2), by their vertices, and the formula of the field's ``slope`` along their outward normal."""
 
     facets: Ints
     slope: str
@@ -32,8 +32,8 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices,
-    then for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
+    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
+    for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
     ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
@@ -48,7 +48,7 @@ class FieldProblem:
     exact: str | None = None
 
     task: ClassVar[Task] = "solve_field"
-    frames: ClassVar[tuple[int]] = (0,)  # a steady field has one
+    frames: ClassVar[tuple[int]] = (0,)  # a steady field has one frame
     rest: ClassVar[AtRest] = NOTHING
     body: ClassVar[None] = None
     muscle: ClassVar[None] = None
@@ -102,7 +102,7 @@ def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
     peclet, tau = stabilisation(mesh, diffusion, np.array(flow), case.element.order)
     form, fixed = case.element.form, _fixed(case, mesh, given)
     if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
-        place = join(case.place, "boundary")  # a constant can be added to the solution
+        place = join(case.place, "boundary")  # the solution is unique only up to a constant
         raise InputError(place, "no value anywhere and no reaction", "a value somewhere, or a reaction")
     return FieldProblem(
         mesh,
@@ -125,7 +125,7 @@ def _check_effects(case: ScalarCase, mesh: FieldMesh) -> None:
         place = join(case.place, f"effect[{i}]")
         if isinstance(effect, Advection) and len(effect.velocity) != dimension:
             got = f"{len(effect.velocity)} components"
-            raise InputError(f"{place}.velocity", got, f"{dimension}, one a coordinate")
+            raise InputError(f"{place}.velocity", got, f"{dimension}, one for each coordinate")
         if isinstance(effect, Source):
             _try(effect.strength, mesh.points[mesh.cells].mean(axis=1), f"{place}.strength")
             if effect.where == "y above average" and dimension == 1:
@@ -158,7 +158,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
-    """The values (n,) that files of bounds prescribe at vertices, NaN where they prescribe none."""
+    """The values (n,) at vertices that files of bounds prescribe, NaN where there is none."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
@@ -179,7 +179,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the middles of the edges of the rim whose two ends have one: their mean; NaN at all others."""
+    """The values (e,) at the middles of edges: the mean of the values of both ends on the rim where both have one, else NaN."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -189,7 +189,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
 
 
 def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
-    """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
+    """The value at each node, NaN where it is free; InputError where two conditions disagree on a node."""
     fixed = np.array(given) if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(case.boundary):
@@ -200,7 +200,7 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
             _try(entry.where, mesh.points, f"{place}.where")
         facets = _facets(entry, mesh)
         if entry.slope is not None:
-            keys = facets @ [len(mesh.points), 1][-facets.shape[1] :]  # the same for no two
+            keys = facets @ [len(mesh.points), 1][-facets.shape[1] :]  # different for any two facets
             if np.isin(keys, sloped).any():
                 raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
             sloped = np.concatenate([sloped, keys])

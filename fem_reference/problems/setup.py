@@ -23,21 +23,21 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.problem import AtRest, Task
 from fem_reference.scenes.muscle import MuscleCase, Vector
 
-# Distances to a bone are computed up to here [mm] from it.
+# Distances to a bone are computed up to this far [mm] from it.
 DISTANCE_MARGIN = 12.0
 # The greatest angle [rad] and distance [mm] between the axis of a joint and that of its bone's rotation.
 _SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
 
 
 def kept_distances() -> Path:
-    """The folder of stored distance grids; it may be deleted."""
+    """The folder of stored distance grids, which may be deleted."""
     return platformdirs.user_cache_path("fem_reference") / "distances"
 
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the rounding of its
-    distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, on which the vertices of the surface lie.
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the Gaussian rounding of
+    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, on which the vertices of the surface lie.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Bone:
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
+        """The signed distance to the surface, in the bone's rest frame; InputError where the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
         error, rounding = self.distance_error, self.distance_rounding
         return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())
@@ -65,7 +65,7 @@ class Bone:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint that a ``bone`` turns in, about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm], right-handed.
+    """A joint in which a ``bone`` turns about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm], right-handed.
 
     ``angle_of``: its angle [rad] at a frame number, 0 at rest.
     """
@@ -96,10 +96,10 @@ class AttachedVertices:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
-    frames wanted; ``interval`` [s] from a frame number to the next where the case states it; ``start``, a function from rest
-    positions (n, 3) to those of the first frame, where these differ; ``joints``, about whose axes bones turn; ``regions``, by
-    name those in which effects act.
+    """The set-up of a muscle, which is all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices,
+    and the requested frames; ``interval`` [s] from a frame number to the next, if the case states it; ``start``, a function from
+    rest positions (n, 3) to those of the first frame, where these differ; ``joints``, about whose axes bones turn; ``regions`` by
+    name, in which effects act.
     """
 
     surface: Surface
@@ -112,7 +112,7 @@ class Setup:
     regions: Mapping[str, Region] = field(default_factory=dict, kw_only=True)
 
     task: ClassVar[Task] = "solve"
-    exact: ClassVar[None] = None  # no solution of a muscle is known as a formula
+    exact: ClassVar[None] = None  # the solution for a muscle is not known as a formula
     field: ClassVar[None] = None
 
     @property
@@ -149,7 +149,7 @@ class Setup:
 def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     """The joints of a case; where it names none, one for each bone that rotates, with the bone's name and the axis of its motion.
 
-    InputError where a bone does not rotate about the axis of its joint: its angle would not be defined.
+    InputError where a bone does not rotate about the axis of its joint, as the joint would have no angle.
     """
     if not case.joint:
         moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)

@@ -1,6 +1,6 @@
 """Structured bodies of the catalogue: smooth maps of unit cubes, cut into cells, straight or curved.
 
-All lengths in mm. A region lists the corners of its facets in the order of their lattice: of a quadrilateral, 0 and 3 are opposite.
+All lengths in mm. A region lists the corners of its facets in lattice order: in a quadrilateral, corners 0 and 3 are opposite.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,23 +21,23 @@ Counts = tuple[int, int, int]
 
 # Nodes nearer than this share of the body's size are one node.
 _SAME = 1e-9
-# The bulge of the sides of the square in a disc, by which three blocks meet at its corners with 120 degrees each.
+# The bulge of the sides of the square in a disc, with which three blocks meet at its corners at 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
 # Half the square's side over the radius of its disc.
 _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# The relative excess of the slope of the angle at the apex over its mean, with which the arc length grows evenly.
+# The relative excess of the slope of the angle at the apex over its mean, with which arc length grows evenly.
 _APEX = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Brick:
-    """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the cells
-    along its axes, ``faces`` names the region of the surface that a face of the cube, x0 to z1, is in.
+    """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the numbers
+    of cells along its axes, and ``faces`` maps a face of the cube, x0 to z1, to its region of the surface.
 
-    Where two blocks meet, the axes along their common face have the same directions: so the tetrahedra fit.
+    Where two blocks meet, the axes along their common face have the same directions, so that the tetrahedra match.
     """
 
     place: Map
@@ -46,7 +46,7 @@ class Brick:
 
 
 def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
-    """The body that ``blocks`` make up: nodes at the same place are one, every cell has a positive Jacobian."""
+    """The body that ``blocks`` make up: nodes at the same place are merged, and every cell has a positive Jacobian."""
     grids = [tuple(degree * count + 1 for count in block.counts) for block in blocks]
     units = [np.indices(grid).reshape(3, -1).T / np.subtract(grid, 1) for grid in grids]
     points, name = _merged(np.concatenate([block.place(unit) for block, unit in zip(blocks, units, strict=True)]))
@@ -63,7 +63,7 @@ def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
 
 
 def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
-    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are Kuhn's six of each cube."""
+    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are Kuhn's six in each cube."""
     nodes = reference_nodes(kind, degree)
     if kind == "hexahedron":
         patterns = [nodes]
@@ -76,7 +76,7 @@ def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
 
 
 def _merged(points: Floats) -> tuple[Floats, Ints]:
-    """The different points (n, 3) among ``points``, and the number of each of ``points`` among them."""
+    """The distinct points (n, 3) among ``points``, and the number of each of ``points`` among these."""
     tolerance = _SAME * float(np.ptp(points, axis=0).max())
     first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
     name = connected_parts(first, second, len(points))
@@ -92,7 +92,7 @@ def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: 
 
 
 def _upright(points: Floats, cells: Ints, kind: Kind, degree: int) -> Ints:
-    """The ``cells``, those of negative volume mirrored: the first two axes of their reference cell exchanged."""
+    """The ``cells``, of which those of negative volume are mirrored: the first two axes of their reference cell are exchanged."""
     corners = points[cells[:, [0, 1, 2, 3 if kind == "tetrahedron" else 4]]]
     wrong = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
     nodes = reference_nodes(kind, degree)
@@ -114,7 +114,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
 
 
 def joined(pieces: Mapping[str, Cells]) -> Cells:
-    """The mesh of separate ``pieces`` of one kind and degree; regions have the name of their piece before theirs: ``left_x1``."""
+    """The mesh of separate ``pieces`` of one kind and degree; a region's name follows that of its piece: ``left_x1``."""
     meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
     if len(kinds) != 1:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
@@ -131,7 +131,7 @@ def warped_box(
 ) -> Cells:
     """A :func:`box` whose inner nodes are moved, by up to ``bump`` of its size: its faces stay where they are.
 
-    From 0.15 on cells may turn over: curved tetrahedra first, where there is one cell only along an axis.
+    From 0.15 on cells may be inverted: first curved tetrahedra, where there is only one cell along an axis.
     """
 
     def place(unit: Floats) -> Floats:
@@ -158,8 +158,8 @@ def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind
 def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
     """The octant x, y, z >= 0 of a hollow sphere of radii ``inner`` and ``outer`` [mm].
 
-    It has three patches of ``n`` by ``n`` cells, ``layers`` of them through the wall. A patch is equiangular: great circles at
-    equal angles. Faces: inner, outer, x0, y0, z0.
+    It has three patches of ``n`` by ``n`` cells, with ``layers`` of cells through the wall. A patch is equiangular: its lines are
+    great circles at equal angles. Faces: inner, outer, x0, y0, z0.
     """
 
     def wall(_: Floats, direction: Floats, depth: Floats) -> Floats:
@@ -169,8 +169,8 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
-    """Three blocks of an octant around its corner, by their ``place`` from points (n, 3) on the unit cube's outer faces, unit
-    vectors (n, 3) at angles that are even along an edge, and the share (n, 1) of the path outward; ``ends``: the faces z0 and z1.
+    """Three blocks of an octant around its corner, each by the ``place`` of points (n, 3) on the unit cube's outer faces, unit
+    vectors (n, 3) at even angles along an edge, and the share (n, 1) of the path outward; ``ends``: the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:
@@ -188,7 +188,7 @@ def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, 
 
 
 def _square(flat: Floats, half: float) -> Floats:
-    """Points (n, 2) of the rounded square of ``half`` the side in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
+    """Points (n, 2) of the rounded square with ``half`` a side in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
     return np.asarray(half * flat * (1 + _BULGE * (1 - flat[:, ::-1] ** 2)))
 
 
@@ -205,8 +205,8 @@ def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats
 def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Brick]:
     """Blocks of a body over the unit disc, or its quarter x, y >= 0: ``place`` takes (x, y, third in [0, 1]) to points [mm].
 
-    A square of ``half`` the side is in the middle; ``counts``: cells along half its side, from it to the circle and along the
-    third; ``faces`` of the blocks: x1 is the rim, z0 and z1 the ends.
+    A square with ``half`` a side is in the middle; ``counts``: the cells along half its side, from it to the circle and along the
+    third coordinate; ``faces`` of the blocks: x1 is the rim, z0 and z1 the ends.
     """
     side, rings, layers = counts
     low, along = (0.0, side) if quarter else (-1.0, 2 * side)
@@ -229,7 +229,7 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
     """A solid cylinder of a ``radius`` and a ``length`` [mm] along z from the origin.
 
-    It has ``rings`` of cells around a rounded square of twice as many a side, in ``slices``. Faces: bottom, top, side.
+    It has ``rings`` of cells around a rounded square with twice as many along a side, in ``slices``. Faces: bottom, top, side.
     """
     faces = {"z0": "bottom", "z1": "top", "x1": "side"}
     blocks = _disc(
@@ -269,8 +269,8 @@ def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
 def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
     """The octant x, y, z >= 0 of a ball of radius ``outer`` [mm].
 
-    It has a cube of ``n`` cells a side of length ``core`` [mm] at its centre, and around it ``layers`` of cells that grow evenly
-    from those of the cube to the sphere. Faces: outer, x0, y0, z0.
+    It has a cube with ``n`` cells along each side, of length ``core`` [mm], at its centre, and around it ``layers`` of cells that
+    grow evenly from those of the cube to the sphere. Faces: outer, x0, y0, z0.
     """
     size, far = core / n, outer - core
     growth = scipy.optimize.brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)

@@ -1,4 +1,4 @@
-"""Stresses in solved states by the energies of effects, independently of any solver; and those of effects left out."""
+"""Stresses in solved states by the energies of effects, independently of any solver; also of effects that were left out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,14 +23,14 @@ Acting = Sequence[tuple[Effect, float]]
 Shares = Mapping[str, Floats]
 NONE: Shares = MappingProxyType({})
 
-# The tetrahedra that are sampled, evenly spread, and the places evaluated at once, so that their jets fit in a cache.
+# The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit in a cache.
 _MOST, AT_ONCE = 2048, 1024
-_SMALLEST = 0.05  # the least det F of evaluated tetrahedra; curved ones may be inside out between their corners
+_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved ones may be inverted between their corners
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
     """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of effects ``acting``, (effect, amount) each, and of
-    a stress ``at_rest``, at a ``state`` whose F are jets.
+    a stress ``at_rest``, at a ``state`` whose F consists of jets.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
@@ -39,7 +39,7 @@ def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float =
 
 def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = NONE) -> Floats:
     """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of effects ``acting`` at deformation gradients ``F`` (n, 3, 3) with fibres
-    along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects of time.
+    along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects that depend on time.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
@@ -55,8 +55,8 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
 
 @dataclass(frozen=True)
 class StressSizes:
-    """Sizes of stresses [MPa] in a state, root mean square over the volume: of the acting effects without pressure (``acts``), and
-    of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN where no
+    """Sizes of stresses [MPa] in a state, root mean square over the volume: that of the acting effects without pressure (``acts``),
+    and that of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN where no
     tetrahedron has a positive volume.
     """
 
@@ -80,7 +80,7 @@ class StressSamples:
         self.shares = {name: region(middles) for name, region in regions.items()}
 
     def sizes(self, positions: Floats, acting: Acting, others: Acting) -> StressSizes:
-        """The sizes for the effects ``acting`` and each of the ``others`` besides, with the points at ``positions`` (n, 3)."""
+        """The sizes for the effects ``acting``, and each of the ``others`` added to these, with points at ``positions`` (n, 3)."""
         F = edge_vectors(positions[self.tets]) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
         if not good.any():
@@ -96,14 +96,14 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change of the stress ``now`` (n, 3, 3) by an effect: of an energy its own stress, with the prestrains ``acting``."""
+    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, its own stress with the prestrains of ``acting``."""
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of fibres in the energies, beyond a hundredth of the volume at either end."""
+    """The smallest and the greatest stretch of fibres in the energies, without a hundredth of the volume at either end."""
     if fibre is None:
         return 1.0, 1.0
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
@@ -112,16 +112,16 @@ def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats)
 
 
 def _mean(stress: Floats, volumes: Floats) -> float:
-    """The root mean square of the Frobenius norm."""
+    """The root mean square of the Frobenius norm, over the volume."""
     return float(np.sqrt(((stress**2).sum(axis=(1, 2)) * volumes).sum() / volumes.sum()))
 
 
 class Watch:
-    """The influence of effects that a ``case`` left out in frames that are solved, one after the other. ``frames``: the surface
+    """The influence, on frames that are solved one after the other, of effects that a ``case`` left out. ``frames``: the surface
     (n, 3) of each, and the stresses in its tetrahedra, if any.
 
-    The stress of an omitted effect follows from a state without another solution, as does that of the effects that act. While a run
-    is made, the latter is the ``known`` estimate or, if greater, the stress found so far; at its end, the greatest found.
+    The stress of an omitted effect follows from a state without another solution, as does that of the effects that act. During a
+    run, the latter is the ``known`` estimate or, if greater, the stress found so far; at the end, it is the greatest found.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
@@ -134,7 +134,7 @@ class Watch:
     def sampled(self) -> StressSamples:
         """The sampled tetrahedra."""
         rest = self.built().rest
-        assert rest.mesh is not None  # of a muscle that is filled
+        assert rest.mesh is not None  # the muscle has been filled
         return StressSamples(rest.mesh, rest.directions, self.rest.regions)
 
     @property
@@ -150,7 +150,7 @@ class Watch:
         return self._found(number, estimated if self._tense else max(estimated, STRESS_TOLERANCE * self._most()))
 
     def end(self) -> tuple[Decision, ...]:
-        """The effects that matter, at the first of all frames at which one does, now that all stresses are known."""
+        """The effects that matter at the first frame at which any does, now that all stresses are known."""
         if any(stresses is None for _, stresses in self.frames.values()):
             return ()
         tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
@@ -173,7 +173,7 @@ class Watch:
         return tuple(replace(one, turned_out=number) for one in each if one.needed)
 
     def _decided(self, i: int, now: Estimates, stresses: StressSizes | None) -> Decision:
-        """The decision on an effect: by the stress that it adds in the tetrahedra, of fibres by that alone."""
+        """The decision on an effect: by the stress that it adds in the tetrahedra, and for fibres by that alone."""
         effect = self.left[i]
         found = effect.indicator(now)
         assert found is not None  # effects that were left out have one
@@ -183,7 +183,7 @@ class Watch:
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:
-        """The estimates ``now``, with the speed of the surface up to a frame; loads that come by ramps move it, too."""
+        """The estimates ``now``, with the speed of the surface up to a frame; loads with ramps move it too."""
         before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
         if not before:
             return now

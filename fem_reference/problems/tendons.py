@@ -23,7 +23,7 @@ def force_name(attachment: str) -> str:
 
 
 def check(body: Body) -> None:
-    """Raise InputError where a tendon is beside tension at rest."""
+    """Raise InputError where a tendon is combined with tension at rest."""
     if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
         raise InputError(
             "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
@@ -31,7 +31,7 @@ def check(body: Body) -> None:
 
 
 def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect, ...]) -> Iterator[Prescribed]:
-    """The springs of each effect ``tendon`` among ``effects``, of a set-up ``rest`` filled with a ``mesh`` and ``fibres``."""
+    """The springs of each effect ``tendon`` among ``effects``, for a set-up ``rest`` filled with a ``mesh`` and ``fibres``."""
     for effect in effects:
         if isinstance(effect, Tendon):
             yield _springs(effect, rest, mesh, fibres)
@@ -44,7 +44,7 @@ def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> P
     if entry.tendon is None:
         raise InputError(place, f'the attachment "{effect.on}" without a tendon', "landmarks at its end")
     ends = attached_ends(rest.attached, rest.exempt, fibres)
-    assert ends is not None  # of an attachment
+    assert ends is not None  # there is an attachment
     beyond = (ends.by == number) & np.isfinite(ends.tendons[:, :, 0])
     if not beyond.any():
         raise InputError(place, "no fibre that continues as this tendon", "fibres that end beside the attachment")

@@ -1,4 +1,4 @@
-"""Contact between parts of the surface of one body, which lie on separate pieces of its mesh: several bodies solved as one."""
+"""Contact between parts of a body's surface on separate pieces of its mesh (several bodies in one), or of one part with itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from fem_reference.problems.contact import penalty, remaining
 
 @dataclass(frozen=True)
 class Touching:
-    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its
-    facets, by name. The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm],
-    of the gap between points of either part and the present surface of the other. Under pressure p they overlap by p / k.
-    ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without. ``relaxed``: two frame numbers over which
-    an overlap at rest is removed, as that with bones is; None: that of two parts presses at once, that of a part with itself never,
-    until it comes apart.
+    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its facets, by name.
+    The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm], of the gap between
+    points of either part and the present surface of the other. Under pressure p they overlap by p / k. ``friction``: the
+    coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
+    at rest is removed, as with bones. If None, an overlap of two parts presses at once, and that of a part with itself only once it
+    has come apart.
     """
 
     one: str
@@ -42,13 +42,13 @@ class Touching:
         return pressure_name(self.one, self.other)
 
     def allowance(self, frame: float) -> float:
-        """The share of the overlap at rest that is subtracted at ``frame``; of a part with itself always all, unless it is removed:
-        there is no pressure at rest.
+        """The share of the overlap at rest that is subtracted at ``frame``; for a part with itself all of it, unless it is removed,
+        so that there is no pressure at rest.
         """
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
@@ -65,8 +65,8 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
     """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k); or are one, in a body that does not begin ``moved``. No pair of
-    facets may have two laws.
+    separate pieces of the mesh of ``cells`` (m, k); or are the same region, in a body that does not begin ``moved``. No pair of
+    facets may be under two laws.
     """
     if not touching:
         return
@@ -78,7 +78,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
         if law.one != law.other and len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
             got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
-        if law.one == law.other and moved:  # what was in front of what is not known
+        if law.one == law.other and moved:  # it is unknown which side was in front
             raise InputError(
                 "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
             )

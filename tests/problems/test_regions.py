@@ -159,19 +159,19 @@ BODY = Body(
         (
             WHOLE[1:],
             end(0.5),
-            r"laws of shape \(NeoHooke in tendon\) with a share of 0 at .*want at least 0.5 everywhere",
+            r"isochoric laws \(NeoHooke in tendon\) with a share of 0 at .*want at least 0.5 everywhere",
         ),
         (
             WHOLE[:2] + (("incompressible_penalty", "tendon", BULK),),
             end(0.5),
-            r"laws of volume .* with a share of 0 at",
+            r"volumetric laws .* with a share of 0 at",
         ),
         (
             WHOLE[:2] + (("incompressible", "", BULK), ("incompressible", "tendon", BULK)),
             end(0.5),
-            "laws of pressure .* 2 at",
+            "pressure laws .* 2 at",
         ),
-        (WHOLE[:2] + (("incompressible", "tendon", BULK),), end(0.5), "laws of pressure .* with a share of 0 at"),
+        (WHOLE[:2] + (("incompressible", "tendon", BULK),), end(0.5), "pressure laws .* with a share of 0 at"),
         (WHOLE, end(-1), r'effects\[1\]\.in: got "tendon", which is nowhere in the body'),
         (
             WHOLE,

@@ -1,7 +1,7 @@
 """The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
 
-This side needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), passes the problem as
-a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
+This module needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), passes the problem
+as a file, and passes frames on as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
 import logging
@@ -54,8 +54,8 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError below ``place`` unless laws resist shear and a change of volume, the element suits tetrahedra and effects,
-    and the ranks suit the linear solver.
+    """Raise InputError for a key below ``place`` unless the laws resist shear and a change of volume, the element suits tetrahedra
+    and the effects, and the number of ranks suits the linear solver.
     """
     if any(isinstance(one, MuscleContact) for one in effects):
         _check_touching(settings, place)
@@ -75,7 +75,7 @@ def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -
     """Continue from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
     there = kept(cut_off, problem.body)
-    again = settings.reuse and not _has_steps(problem)  # states are used again
+    again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
     if there.frames:
         log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
 
@@ -93,7 +93,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     describe = _describing(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
-    def pass_on(frame: Frame) -> None:  # those of the relaxation before the first requested frame are dropped
+    def pass_on(frame: Frame) -> None:  # frames of the relaxation before the first requested one are dropped
         if frame.number in problem.frames:
             described = describe(frame, is_first=not passed)
             sink(described if chosen.store_state else replace(described, state=None))
@@ -104,7 +104,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = "while an overlap at rest was removed, before the first frame (which is shown as it was given)"
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
-    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
+    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # the key in a scene
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
@@ -113,7 +113,7 @@ class _Describe(Protocol):
 
 
 def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
-    """A function that describes a frame. For several muscles it does so for each: scalars then begin with its name and a dot."""
+    """A function that describes a frame. For several muscles, the names of scalars begin with that of the muscle and a dot."""
     if isinstance(problem, MuscleProblem):
         return partial(_described, problem, loads=_are_known(problem, settings))
     spans, names = problem.spans, tuple(problem.problems)
@@ -135,7 +135,7 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
 
 
 def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
-    """The components of the force and the moment of the muscle ``name`` on the ``other``, where these may touch."""
+    """The components of the force and the moment of the muscle ``name`` on the ``other``, if the two may touch."""
     found, key = dict[str, float](), force_between(name, other)
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         if key in vectors:
@@ -144,8 +144,8 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True where external loads act and follow from the shape alone. Load and moment are quadratic in it, so a quadrature of a
-    degree below 4 is not exact.
+    """True where external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
+    solver's quadrature has to be of degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))
@@ -154,20 +154,20 @@ def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
 
 
 def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
-    """The components of external loads on the muscle, ``load_force_`` [N] and, about the origin, ``load_moment_`` [N mm]: from the
-    shape alone, without the solver's forms.
+    """The components of the external load on the muscle, ``load_force_`` [N], and of its moment about the origin, ``load_moment_``
+    [N mm], computed from the shape alone, without the solver's forms.
     """
     state = frame.state
     assert state is not None  # of a muscle
     by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
     load = external_load(problem, frame.number, by, None if since is None else state.rate * quadratic(since))
-    assert load is not None  # as _are_known says
+    assert load is not None  # ``_are_known`` ensures it
     return vector_scalars("load_force", load.force) | vector_scalars("load_moment", load.moment)
 
 
 def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
-    """The frame with a note, and as scalars the magnitudes [N, N mm] of its forces and of all constraints on the muscle, and its
-    ``loads``, where these are known, and its stresses.
+    """The frame with a note and more scalars: the magnitudes [N, N mm] of each force and of the sum over all constraints, the
+    ``loads`` where they are known, and the stresses.
     """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
@@ -191,8 +191,8 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
 
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
-    """The components of the ``kind``, force or moment, of the muscle on each bone: minus the ``vectors`` (3,) on the muscle by its
-    attachments and by contact.
+    """The components of the force or the moment (``kind``) that the muscle exerts on each bone: minus the sum of the ``vectors``
+    (3,) that act on the muscle at its attachments and by contact.
     """
     found = dict[str, float]()
     for bone in problem.bones:
@@ -206,8 +206,8 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
-    ``attachment_error_max`` [mm]. Exact attachments are facets of tets, which cover the vertices only roughly; springs yield.
-    Empty where nothing is attached.
+    ``attachment_error_max`` [mm]. It is not zero: exact attachments are facets of tets, which cover the vertices only roughly, and
+    springs yield. Empty where nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -221,8 +221,8 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
 
 
 def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
-    """Sample points of displacement: by name, the tet of each point and the point at rest, as the map of the tet gives it."""
-    if isinstance(problem, MusclesProblem):  # where muscles are close, a point is in its own
+    """The points at which displacements are sampled: by name, the tet of each point and its position at rest."""
+    if isinstance(problem, MusclesProblem):  # each sampled in its own muscle, however close another is
         each = [_samples(one) for one in problem.problems.values()]
         starts = [span.cells.start for span in problem.spans]
         return {
@@ -242,9 +242,9 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
     check_element(
         settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"
-    )  # of a problem made in Python
+    )  # not checked yet in a problem made in Python
     check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
-    if isinstance(problem, MusclesProblem) or problem.body.touching:  # parts of contact with bones are of one rank, too
+    if isinstance(problem, MusclesProblem) or problem.body.touching:  # both need a single rank
         _check_touching(settings, "reference")
         settings = settings.model_copy(update={"ranks": 1})
     chosen = resources.planned(settings, mesh, resources.available())
@@ -264,7 +264,7 @@ def _has_steps(problem: AnyMuscle) -> bool:
 
 
 def _check_touching(settings: Settings, place: str) -> None:
-    """Raise InputError below ``place`` where the settings do not suit muscles that touch."""
+    """Raise InputError below ``place`` where the settings do not suit muscles that touch each other."""
     if (settings.ranks or 1) > 1:
         want = "1, on which several muscles, or one that touches itself, are solved"
         raise InputError(join(place, "ranks"), settings.ranks, want)

@@ -21,7 +21,7 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI  # isort: skip
 from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
-QUADRATURE_DEGREE = 8  # as in scikit_fem, and on the boundary the same rule of 3 points
+QUADRATURE_DEGREE = 8  # the rules of scikit_fem; on the boundary it has 3 points
 FACET_DEGREE = 5
 
 
@@ -37,7 +37,7 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
         strong = sum(effect.strong(psi, place) for effect in problem.effects)
         weak += _by_cell(msh, problem.tau) * problem.advection.along(test) * strong
     dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": QUADRATURE_DEGREE})
-    # The zero makes a right-hand side even without sources.
+    # The zero term gives the residual a right-hand side even where there are no sources.
     residual = weak * dx - fem.Constant(msh, 0.0) * test.value * dx
     ds = meshes.facet_measure(msh, meshes.local_facets(msh, [flux.facets for flux in problem.fluxes]), FACET_DEGREE)
     for i, flux in enumerate(problem.fluxes):
@@ -69,7 +69,7 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
 
 
 def solve(problem: FieldProblem) -> tuple[Floats, Outcome]:
-    """The values (N,) in the order of the problem, not-a-number after a failure, and the outcome."""
+    """The values (N,) in the order of the problem's nodes, NaN after a failure, and the outcome."""
     begin = time.perf_counter()
     forget_peak_memory()
     left, right, space, node = equations(problem)
@@ -93,14 +93,14 @@ def _state(function: Any) -> FieldState:
 
 
 def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
-    """The function that is constant on each cell, with the problem's value (m,) there."""
+    """The function that is constant on each cell, with the problem's ``values`` (m,) by cell."""
     function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
     function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
     return function
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
-    """Matrix and right-hand side; the equation of each ``fixed`` (N,) unknown, NaN where free, is replaced by its value."""
+    """Matrix and right-hand side; the equation of an unknown with a ``fixed`` (N,) value, NaN where free, sets it to that."""
     values = fem.Function(space)
     values.x.array[:] = np.nan_to_num(fixed)
     conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]
@@ -113,10 +113,10 @@ def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, A
 
 
 def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
-    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason where there is none."""
+    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason why there is none, if so."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
-        return x.array, "the equations have a number that is not finite: a formula without a value somewhere?"
+        return x.array, "the equations have a number that is not finite: does a formula lack a value somewhere?"
     solver = PETSc.KSP().create(A.comm)
     solver.setOperators(A)
     solver.setType("preonly")

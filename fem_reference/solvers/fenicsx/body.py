@@ -44,12 +44,12 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
-        self.conserves = not any(changed)  # True where no energy changes without deformation of the body
-        self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
+        self.conserves = not any(changed)  # True where the energy changes only as the body deforms
+        self.judged = False  # True once its energy gap counts: only then is a halfway state worth its cost
         self.mesh = meshes.distribute(self.comm, body.mesh)
         count = self.mesh.topology.index_map(3).size_local
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
-        self.local = np.full(len(body.mesh.cells), -1)  # by cell of the body's mesh that of this rank, else -1
+        self.local = np.full(len(body.mesh.cells), -1)  # this rank's number of each cell of the body, else -1
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
@@ -78,7 +78,7 @@ class AssembledBody:
         self.checks: tuple[StateCheck, ...] = *self.contacts, self.determinants, self.validity, self.path, self
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
-        self.modes: float | None = None  # of the last examined state
+        self.modes: float | None = None  # negative modes of the last examined state
         self.at = body.frames[0]  # the frame of the last good state
         self.nodal = Nodal(body.mesh, self.cells, settings.element, self.displacement, self.clock, form.rest)
 
@@ -96,13 +96,13 @@ class AssembledBody:
         return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where the energy has no value in the present state."""
+        """The trouble *diverged* where the energy has no value in the present state."""
         if np.isfinite(self.energy()):
             return None
         return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
-        """Begin with the nodes at the positions to which ``moved`` takes their rest points (n, 3) [mm]."""
+        """Begin with the nodes at the positions to which ``moved`` maps their rest points (n, 3) [mm]."""
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
@@ -165,16 +165,16 @@ class AssembledBody:
             one.go_back()
 
     def _begin(self, before: Floats) -> None:
-        """Find the initial acceleration of the body at its rest ``before``: by a step in which nothing moves."""
+        """Find the initial acceleration of the body at rest, with unknowns ``before``, by a step in which nothing moves."""
         self.clock.instant(before)
         self.set_frame(self.clock.at)
-        self.newton.solve(self.clock.at)  # with a tangent that is all mass: if it fails, the first step will show it
+        self.newton.solve(self.clock.at)  # the tangent is all mass; a failure would show in the first step
         self.clock.begin(self.unknowns.x.array)
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Take up an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and it is on the
-        path: after a full turn the loads are as at rest, and the body is not. Its residual proves the equilibrium.
+        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and it is on the
+        path (after a full turn the loads are those at rest, but the state is not). Its residual proves the equilibrium.
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -184,7 +184,7 @@ class AssembledBody:
         if self.recalled is None:
             return False
         self.unknowns.x.array[:] = self.recalled.unknowns
-        self.unknowns.x.array[:] -= self.system.missing()  # rounding of a returning motion
+        self.unknowns.x.array[:] -= self.system.missing()  # differs by the rounding of a returning motion
         if self.contact:
             self.contact.update(frame)
         proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
@@ -208,7 +208,7 @@ class AssembledBody:
             self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
-        """Take up the state of ``frame`` with ``unknowns`` (n,), as if it was just reached."""
+        """Restore the state of ``frame`` with ``unknowns`` (n,), as if it had just been reached."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         if self.contact:
@@ -250,8 +250,8 @@ class AssembledBody:
         """The number of directions in which the energy falls from the present state, which is that of ``frame``; None where the
         tangent is not symmetric. The state is kept for later frames with the same loads.
 
-        With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames,
-        with the bones at rest from now on: the viscous stress of this step is left out.
+        With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames, with
+        the bones at rest from now on, and without the viscous stress of this step.
         """
         if self.recalled is not None:
             self.modes = self.recalled.negative_modes
@@ -265,8 +265,8 @@ class AssembledBody:
         return modes
 
     def modes_of_material(self) -> float:
-        """The negative modes of the present state that the material certainly has."""
-        assert self.stability is not None  # it has counted modes
+        """The number of negative modes of the present state that the material has for certain."""
+        assert self.stability is not None  # modes have been counted
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()
 
@@ -276,7 +276,7 @@ class AssembledBody:
         return self.integral(self.energy_form) + float(self.comm.allreduce(own, MPI.SUM))
 
     def integral(self, form: Any) -> float:
-        """A compiled form, summed over the ranks."""
+        """The integral of a compiled ``form``, summed over the ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
@@ -290,7 +290,7 @@ class AssembledBody:
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    # All others have an energy.
+    # Without friction and loads that have no energy, the tangent is symmetric.
     symmetric = not body.rubs and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":

@@ -14,21 +14,21 @@ from fem_reference.solvers.fenicsx.meshes import Displacement
 
 
 class PrescribedRegion:
-    """A ``Prescribed`` of a ``displacement`` on this rank's ``facets``."""
+    """A ``Prescribed`` condition on a ``displacement``, over this rank's ``facets``."""
 
     def __init__(self, displacement: Displacement, entry: Prescribed, facets: Ints) -> None:
         self.entry, self.unknowns, self.along = entry, displacement.unknowns, list(entry.components)
         self.nodes = fem.locate_dofs_topological(displacement.space, 2, facets)
         self.rest: Floats = displacement.space.tabulate_dof_coordinates()[self.nodes]
         self.all = displacement.dofs[self.nodes]  # the unknowns (m, 3) of the nodes
-        self.dofs: Ints = np.ravel(self.all[:, self.along])  # prescribed exactly or by springs
+        self.dofs: Ints = np.ravel(self.all[:, self.along])  # those prescribed, exactly or by springs
         self.exact = self.dofs if entry.stiffness is None else np.zeros(0, np.int64)
         self.wanted = fem.Function(displacement.space)
         self.extension = np.zeros_like(self.rest)
 
     @property
     def prescribed(self) -> Floats:
-        """The values (n,) prescribed now for the unknowns ``dofs``."""
+        """The present prescribed values (n,) of the unknowns ``dofs``."""
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     def springs(self, form: Form) -> Any:
@@ -47,7 +47,7 @@ class PrescribedRegion:
         self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(ends, frame) - self.extension
 
     def extend(self, response: Floats) -> None:
-        """Extend springs at rest by the ``response`` (n,) of the unknowns: a path moves the end of each that far back."""
+        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each is moved back by it."""
         if self.entry.stiffness is not None:
             self.extension = np.where(np.isin(np.arange(3), self.along), response[self.all], 0.0)
             self.wanted.x.array.reshape(-1, 3)[self.nodes] = -self.extension
@@ -65,7 +65,7 @@ class PrescribedRegion:
 
 
 class PointSprings:
-    """A ``Prescribed`` by springs at ``points`` of this rank's cells. The points are not unknowns, so none is exact."""
+    """A ``Prescribed`` condition by springs at ``points`` of this rank's cells. Points are not unknowns, so it is never exact."""
 
     exact: Ints = np.zeros(0, np.int64)
 
@@ -74,7 +74,7 @@ class PointSprings:
         self.entry, self.unknowns, self.points = entry, unknowns, points
         self.along = along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
-        self.ends = self.wanted = np.array(points.rest)  # of the springs, at rest
+        self.ends = self.wanted = np.array(points.rest)  # of the springs' other ends, at rest
 
     @property
     def prescribed(self) -> Floats:
@@ -90,7 +90,7 @@ class PointSprings:
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the spring forces to ``residual`` over this rank's unknowns; linearly advanced by ``moves`` (n,) of them, where
+        """Add the spring forces to ``residual`` over this rank's unknowns; advanced to first order by ``moves`` (n,) of these, if
         given.
         """
         now = self.unknowns.x.array
@@ -112,7 +112,7 @@ class PointSprings:
 
 class Tendons(PointSprings):
     """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which its path moves: each pulls with
-    its stiffness times its extension ``l - l0``, and slack with nothing.
+    its stiffness times its extension ``l - l0``, and not at all when slack.
     """
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
@@ -121,7 +121,7 @@ class Tendons(PointSprings):
         self.lengths = np.linalg.norm(points.rest - self.ends, axis=1)  # at rest
 
     def extend(self, response: Floats) -> None:
-        """Nothing: no tendon is taut at rest."""
+        """Do nothing: no tendon is taut at rest."""
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
         """``k n n^T + k (l - l0) / l (1 - n n^T)`` along the direction n of a taut line, 0 of a slack one."""

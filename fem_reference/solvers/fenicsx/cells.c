@@ -1,9 +1,9 @@
 /* Residual and tangent of an energy per rest volume, cell by cell: the sums over quadrature points of finite elements.
 
-   What the energy is, its first and second derivatives at the points say, which are given; here they meet the element's basis.
+   The caller gives the first and second derivatives of the energy at the points; here they are combined with the element's basis.
    Variables at a point, in this order: by component i of the displacement its derivatives along x, y, z and, where KINDS is 4, the
-   displacement itself; then, where there are PRESSURES, the pressure. Derivatives come as VARIABLES first ones and the upper
-   triangle of the second ones, row by row.
+   displacement itself; then, where there are PRESSURES, the pressure. Derivatives are given as the VARIABLES first ones, then the
+   upper triangle of the second ones, row by row.
 
    Unknowns of a cell, in this order: component by component of the displacement its NODES, then the PRESSURES.
 
@@ -25,10 +25,10 @@ typedef struct { /* the element at its quadrature points */
     const double *pressures; /* (POINTS, PRESSURES or 1) values of the basis of the pressure */
 } Element;
 
-/* Where the second derivative by variables v and w stands, v <= w. */
+/* The index of the second derivative with respect to variables v and w, v <= w. */
 static inline int second(int v, int w) { return VARIABLES + v * VARIABLES - v * (v - 1) / 2 + w - v; }
 
-/* What each variable of a component is of its nodes (ROWS), and the weights (POINTS) in the rest volume of a cell at x. */
+/* The variables of a component as functions of its nodes (ROWS), and the weights (POINTS) by rest volume of a cell at x. */
 static void basis(const Element *e, const double *x, vector (*rows)[WIDE], double *weights)
 {
     for (int q = 0; q < POINTS; q++) {
@@ -110,7 +110,7 @@ static void between(int i, int j, const double *given, int stride, vector (*rows
     }
 }
 
-/* The part of the tangent that has to do with the pressure, in a ``unit`` of its own. */
+/* The part of the tangent that involves the pressure, in a ``unit`` of its own. */
 static void with_pressure(const Element *e, const double *given, int stride, vector (*rows)[WIDE], const double *weights,
                           double unit, double (*tangent)[UNKNOWNS])
 {
@@ -137,10 +137,10 @@ static void with_pressure(const Element *e, const double *given, int stride, vec
     }
 }
 
-/* Adds what ``count`` cells at x (count, GEOMETRY, 3) contribute: from the derivatives ``given`` (count, POINTS, stride), to
+/* Adds the contributions of ``count`` cells at x (count, GEOMETRY, 3): from the derivatives ``given`` (count, POINTS, stride), to
    ``residual`` at their ``unknowns`` (count, UNKNOWNS), and, unless it is null, to ``tangent`` at the places (count, UNKNOWNS,
-   UNKNOWNS) of their entries, with pressures in a ``unit``. Unless it is null, the tangent times ``moves`` of the displacement is
-   added to the residual as well. */
+   UNKNOWNS) of their entries, with pressures in a ``unit``. Unless ``moves`` is null, the tangent times these
+   changes of the displacement is added to the residual as well. */
 void add_cells(const Element *e, long count, const double *x, const double *given, int stride, const int *unknowns,
                const int *places, double *residual, double *tangent, double unit, const double *moves)
 {
@@ -170,8 +170,8 @@ void add_cells(const Element *e, long count, const double *x, const double *give
     }
 }
 
-/* Adds what ``count`` points of ``cells`` contribute to the tangent, whose traction has a slope (count, 3, 3) in where they are; the
-   ``basis`` (count, NODES) carries them. */
+/* Adds to the tangent the contributions of ``count`` points of ``cells``, where ``slope`` (count, 3, 3) is the derivative of the
+   traction with respect to the position, and ``basis`` (count, NODES) has the values of the functions there. */
 void add_points(long count, const int *cells, const double *basis, const double *slope, const int *places, double *tangent)
 {
     for (long point = 0; point < count; point++) {
@@ -187,8 +187,8 @@ void add_points(long count, const int *cells, const double *basis, const double 
     }
 }
 
-/* Where the entries of the cells are in a matrix of sorted rows: ``starts`` of rows in ``columns``. An entry of a row or column
-   that is ``fixed`` is at ``nowhere``. */
+/* Finds the places of the cells' entries in a sparse matrix: ``starts`` of its rows in the sorted ``columns``. An entry of a row or
+   column that is ``fixed`` gets the place ``nowhere``. */
 void find_places(long count, const int *unknowns, const int *starts, const int *columns, const char *fixed, int nowhere,
                  int *places)
 {

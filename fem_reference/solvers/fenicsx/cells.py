@@ -26,7 +26,7 @@ class _Element(ctypes.Structure):
 
 
 class Structure(NamedTuple):
-    """The sparsity of a matrix over this rank's unknowns, ghosts too: ``starts`` of rows in the sorted ``columns``."""
+    """The sparsity of a matrix over this rank's unknowns, ghosts included: the ``starts`` of rows in the sorted ``columns``."""
 
     starts: Places
     columns: Places
@@ -34,8 +34,8 @@ class Structure(NamedTuple):
 
 @dataclass
 class Tangent:
-    """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of
-    unknown pressures. The last entry collects those of prescribed unknowns.
+    """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of unknown
+    pressures. The last entry collects all that belong to prescribed unknowns.
     """
 
     entries: Floats
@@ -44,8 +44,8 @@ class Tangent:
 
 
 class CellSums:
-    """The sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, by component of the displacement, then
-    the pressures; ``structure``: that of the tangent.
+    """Sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, the displacement component by component, then the
+    pressures; ``structure``: the sparsity of the tangent.
     """
 
     def __init__(self, form: Form) -> None:
@@ -89,9 +89,9 @@ class CellSums:
     def add(
         self, residual: Floats, into: Tangent | None = None, moves: Floats | None = None, *, pointwise: bool = False
     ) -> None:
-        """Add the forces of cells to ``residual`` (n,) over this rank's unknowns, ghosts too. Where a tangent is given, add theirs
-        ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if any. ``pointwise``: the
-        pressure follows the volume at every point and is no unknown of its own.
+        """Add the forces of the cells to ``residual`` (n,) over this rank's unknowns, ghosts included. If a tangent is given, add
+        that of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if any.
+        ``pointwise``: the pressure follows the volume at every point and is no unknown of its own.
         """
         given = self.form.derivatives.first if into is None else self.form.derivatives.second
         for some in self._chunks():
@@ -119,15 +119,15 @@ class CellSums:
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
         """Add the tangent of tractions at points of ``cells`` (n,) with the values ``basis`` (n, k) of their functions; ``slope``
-        (n, 3, 3) is the derivative of the tractions by the positions of the points.
+        (n, 3, 3) is the derivative of the tractions with respect to the positions of the points.
         """
         given = cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope)
         arrays: tuple[NDArray[Any], ...] = *given, into.places, into.entries
         self.code.add_points(ctypes.c_long(len(cells)), *map(_address, arrays))
 
     def softness(self) -> Floats:
-        """The mass matrix (m, p, p) by cell of the pressures [mm3/MPa] over the stiffness against them: twice the shear
-        stiffness, from the mean diagonal of the energy's second derivatives, and the bulk modulus.
+        """The mass matrix (m, p, p) of the pressures, by cell [mm3/MPa], weighted with ``1 / (2 mu) + 1 / K``: K is the bulk
+        modulus, and mu the shear stiffness, the mean diagonal of the energy's second derivatives.
         """
         rows, basis = self._diagonal(), self._pressures()
         stiff = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3)]
@@ -145,7 +145,7 @@ class CellSums:
         return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
 
     def _projection(self) -> Floats:
-        """The second derivative (m, p, p) by cell [mm3/MPa] of the negative energy of ``body.is_stabilised``, at rest."""
+        """The second derivative (m, p, p), by cell [mm3/MPa], of minus the energy of ``body.is_stabilised``, at rest."""
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
@@ -167,8 +167,8 @@ class CellSums:
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
-        """Cells a chunk at a time: first and second derivatives of the present energy at their points (m, q, v), and the volumes
-        (m, q) [mm3] of these.
+        """One chunk of cells at a time: the first and second derivatives of the present energy at their points (m, q, v), and the
+        volumes (m, q) [mm3] of the points.
         """
         for some in self._chunks():
             cells = np.arange(some.start, some.stop, dtype=np.int32)
@@ -184,8 +184,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives by ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The stiffness from
-    the pressure, K cof F x cof F, replaces the terms that couple pressure and the others.
+    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The
+    stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others
@@ -207,7 +207,7 @@ def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Fl
     points, weights = rule
     displaced = lagrange(kind, degree).tabulate(1, points)[..., 0]
     shape = lagrange(kind, msh.geometry.cmap.degree).tabulate(1, points)[1:, :, :, 0]
-    pressures = np.full((len(points), 1), float(pressure == 0))  # constant in the cell, or none
+    pressures = np.full((len(points), 1), float(pressure == 0))  # a constant pressure in the cell, or none
     if pressure:
         pressures = lagrange(kind, pressure).tabulate(0, points)[0, :, :, 0]
     return {

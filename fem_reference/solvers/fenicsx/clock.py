@@ -10,15 +10,15 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.forms import TimeStep
 
-# The share of all frames over which forces act on a body at rest, to find its initial acceleration.
+# The duration, as a share of all frames, for which forces act on a body at rest to find its initial acceleration.
 _INSTANT = 1e-7
 
 
 class Clock:
     """Sets the time ``step`` of a form; does nothing for a form without one.
 
-    With inertia a body is at rest up to its first requested frame: ``resting`` until its initial acceleration is known, moving
-    with velocities from then on.
+    With inertia a body is at rest up to its first requested frame: it is ``resting`` until its initial acceleration is known, and
+    moves from then on.
     """
 
     def __init__(self, body: Body, step: TimeStep | None) -> None:
@@ -49,15 +49,15 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def begins(self) -> bool:
-        """True where a body with inertia first moves in the next load step; its acceleration has to be known."""
+        """True where a body with inertia first moves in the next load step, before which its acceleration has to be found."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
-        """Start a load step so short that nothing moves, from rest at ``unknowns``."""
+        """Start a load step from rest at ``unknowns`` that is so short that nothing moves."""
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
-        """End the instant with ``unknowns``: velocities are 0, and accelerations known."""
+        """End that instant with ``unknowns``: velocities are 0, and accelerations are now known."""
         assert self.step is not None  # there is momentum
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False

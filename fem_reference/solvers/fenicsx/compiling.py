@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: one process at a time compiles, and removes incomplete files of a form before."""
+"""Compilation of forms for this machine: one process at a time compiles, after it has removed incomplete files of a form."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -23,11 +23,11 @@ from ufl.domain import extract_domains
 
 from fem_reference.foundations import native
 
-# All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that nothing is NaN, but NaN
-# shows a state without a value; and it makes the whole process round denormal numbers to zero.
+# All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that no number is NaN, which here
+# marks a state without a value, and it makes the whole process round denormal numbers to zero.
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
 FLAGS += ["-fassociative-math", "-freciprocal-math"]
-# FFCx stores compiled forms under their content and these options, the machine among them.
+# FFCx stores compiled forms under a hash of their content and these options, which include the kind of machine.
 OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={native.machine()}"]}
 
 
@@ -47,8 +47,8 @@ def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
 
 
 def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's search for a compiled form, after incomplete files of it are removed. As the process has the lock, none is in
-    progress: an interrupted or killed process left them, and FFCx would wait for them.
+    """FFCx's search for a compiled form, after incomplete files of it are removed. As this process holds the lock, no other is
+    writing them: an interrupted or killed process left them, and FFCx would wait for their completion.
     """
 
     @wraps(search)
@@ -75,7 +75,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the places of what it reads among the functions and constants of its formula."""
+    """A compiled expression, its ``module``, and the places in its formula's functions and constants of those that it reads."""
 
     expression: Any
     module: Any
@@ -83,7 +83,7 @@ class _Code(NamedTuple):
     constants: tuple[int, ...]
 
 
-class BoundExpression(fem.Expression):  # type: ignore[misc]  # its parameters of type are those of its values
+class BoundExpression(fem.Expression):  # type: ignore[misc]  # its type parameter is that of its values
     """A compiled expression that reads the functions and constants of one body."""
 
     def __init__(self, code: _Code, functions: Sequence[Any], constants: Sequence[Any]) -> None:
@@ -103,14 +103,14 @@ def expression(value: Any, points: Any) -> Any:
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
-    """Compiled expressions at reference ``points`` (q, 3): the ``first`` ones of the scalars ``values``, and all of them."""
+    """Compiled expressions at reference ``points`` (q, 3): one of the ``first`` few of the scalars ``values``, and one of all."""
     whole, part = _bound(ufl.as_vector(values), points, (first,))
     return part, whole
 
 
 def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
-    """A compiled ``value`` at reference ``points`` (q, 3), and its ``firsts`` components. A formula is differentiated and searched
-    for among the compiled ones only once: in another body only its functions and constants differ, in the same order.
+    """A ``value`` compiled at reference ``points`` (q, 3), once for each number of components in ``firsts``. A formula is
+    differentiated and looked up only once: another body has other functions and constants in the same order.
     """
     functions, constants = extract_coefficients(value), extract_constants(value)
     labels = sorted(extract_type(value, Label), key=Label.count)
@@ -134,7 +134,7 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
-    """Replaces variables of differentiation by their values: UFL numbers them through the whole process, so a compiled form would
+    """Replaces variables of differentiation by their values: UFL numbers them consecutively in a process, so a compiled form would
     not be found again.
     """
 

@@ -1,4 +1,4 @@
-"""Contact of bones with material points of a body: pressure of the gap with its tangent, added to the sums over cells.
+"""Contact of bones with material points of a body: its pressure, which depends on the gap, and its tangent.
 
 Distances are computed only for points that may be near a bone (``broad_phase``), and only points under pressure are summed. A
 load step that begins and ends without contact pressure is solved without contact.
@@ -23,18 +23,18 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.friction import Friction, Grip
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in a bone than this share of its half thickness counts as through.
+# A point deeper in a bone than this share of the bone's half thickness counts as gone through.
 _GIVEN_WAY = 0.75
-# Greatest depth in a rim of the straight path of a point that slides round it, as a share of half the thickness; the
-# smoothing bounds it too.
+# A point that slides round a rim has a straight path that cuts the rim at most this deep, as a share of the half thickness; the
+# smoothing is a bound too.
 _RIM = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
     """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,); no other point is within the
-    smoothing. Of the ``pressed`` points (k,) among them: the ``pressure`` (k,) [MPa per rest area], the ``traction`` (k, 3) and
-    its derivative ``slope`` (k, 3, 3) [MPa/mm], with those of friction, and its ``grip``.
+    smoothing. For the ``pressed`` points (k,) among them it has the ``pressure`` (k,) [MPa per rest area], the ``traction`` (k, 3)
+    and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction, and the friction's ``grip``.
     """
 
     near: Ints
@@ -63,14 +63,14 @@ class ContactForces:
         frame: float,
         spent: Spent,
     ) -> None:
-        """``frame``: at which the body is at rest."""
+        """``frame``: the frame at which the body is at rest."""
         self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
         self.friction, self.dissipated = list[Friction](), 0.0
         self.look()
         self.update(frame)
-        self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # at rest, at most
+        self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # the greatest at rest
         if law.relaxed:
             for overlap, one in zip(self.overlaps, self.now, strict=True):
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
@@ -78,7 +78,7 @@ class ContactForces:
         self.settle()
 
     def look(self) -> None:
-        """Search for points within the reach of each bone: where it presses with the overlaps at rest, or supports a body there."""
+        """Search for points within reach of each bone: also those that overlap it, or that it supports, at rest."""
         patches, support = Patches(self.points), self.law.in_situ or 0.0
         reach = [self.law.smoothing + max(support, float(-one.min(initial=0.0))) for one in self.overlaps]
         self.nearby = [Nearby(bone.shape, far, patches) for bone, far in zip(self.bones, reach, strict=True)]
@@ -110,7 +110,7 @@ class ContactForces:
         return replace(found, traction=own[0], slope=own[1], grip=grip)
 
     def _held(self, i: int) -> Floats:
-        """The places (n, 3) [mm] of the points in the frame of bone ``i`` where it presses them; NaN elsewhere."""
+        """The places (n, 3) [mm], in the frame of bone ``i``, of the points that it presses; NaN for all others."""
         found, some = np.full(self.points.rest.shape, np.nan), self.now[i].pressed
         found[some] = self._local(i, self.frame, self.moved, some)
         return found
@@ -123,12 +123,12 @@ class ContactForces:
         return places, gap + self.law.allowance(frame) * self.overlaps[i][which]
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,) in the frame of a bone at ``frame``, with nodes ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,) in the frame of a bone at ``frame``, of nodes at ``moved`` (m, 3)."""
         pose = self.bones[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,), with nodes ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,), the nodes being at ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
@@ -141,7 +141,7 @@ class ContactForces:
         return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
 
     def predicted(self, frame: float, moves: Floats) -> Tractions:
-        """The ``tractions`` after ``moves`` of the unknowns and with the bones at ``frame``, linearised in both."""
+        """The ``tractions`` once the unknowns change by ``moves`` and the bones are at ``frame``, linearised in both."""
         which, found = self.tractions()
         ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -167,8 +167,8 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; also on the
-        points of each part of the law.
+        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; and, under
+        the names of both, those on the points of each part that the law names.
         """
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -181,8 +181,8 @@ class ContactForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, whose distance was computed;
-        ``overlap_at_rest`` [mm], of the deepest point, where it is removed or stays; ``friction_work`` [N mm], dissipated in all.
+        contact, ``contact_area`` [mm2], and its ``contact_points``; the number ``contact_points_near`` of those whose distance was
+        computed; ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
@@ -205,7 +205,7 @@ class ContactForces:
         return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
     def deepest(self) -> str:
-        """The depth of the deepest point, the bone that it is in, and its place."""
+        """The depth of the deepest point, its bone and its place, in words."""
         mine = []
         for entry, one in zip(self.bones, self.now, strict=True):
             if len(one.near):
@@ -233,16 +233,16 @@ class ContactForces:
         return self.now, self.frame, self.moved
 
     def restoring(self) -> Callable[[], None]:
-        """A function that restores the present state, as the unknowns have been."""
+        """A function that restores the present state, once the unknowns have been restored."""
         return partial(self.go_back, self.state)
 
     def go_back(self, state: State | None = None) -> None:
-        """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        """Restore an earlier ``state``, by default the settled one, once the unknowns have been restored."""
         self.now, self.frame, self.moved = state or self.settled
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Diverged where a point went through a bone since the last settled state, is pressed near the middle of one, or met one
-        with friction from afar.
+        """The trouble *diverged* where a point went through a bone since the last settled state, is pressed near the middle of one,
+        or met one with friction from too far away.
         """
         with self.spent.on("contact"):
             through = [one for i in range(len(self.bones)) if (one := self._through(i))]
@@ -260,7 +260,7 @@ class ContactForces:
         return mine
 
     def _from_afar(self) -> list[tuple[float, str]]:
-        """The bones with friction that a point met in one step from where no distance is known, so its slip cannot be computed."""
+        """The bones with friction that a point met from so far away that its distance, and so its slip, are unknown."""
         mine = list[tuple[float, str]]()
         for i, friction in enumerate(self.friction):
             pressed = self.now[i].pressed
@@ -271,20 +271,20 @@ class ContactForces:
         return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the greatest number, over all ranks; None where there is none."""
+        """The sentence with the greatest number among those of all ranks; None where there is none."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
-        """The point that went farthest through a bone since the last settled state; None where none did. On its straight path
-        through the bone's frame it was inside, deeper than at both ends, and it left on the other side.
+        """The point that went farthest through a bone since the last settled state; None where none did. Such a point's straight
+        path in the frame of the bone is deeper inside than both of its ends and leaves on the other side.
         """
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away no gap is known: the outward direction there is the direction back, or the direction of travel.
+        # Far away no gap is known: the outward direction is then the reverse of travel at the start and that of travel at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

@@ -17,9 +17,9 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,)
-    that carry them, and the values ``basis`` (n, k) there of the functions of nodes at ``nodes`` (n, k, 3) [mm], whose unknowns
-    are ``dofs`` (n, k, 3).
+    """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,) that
+    carry them, and and of the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
+    ``nodes`` (n, k, 3) [mm] and the unknowns ``dofs`` (n, k, 3).
     """
 
     rest: Floats
@@ -39,7 +39,7 @@ class ContactPoints:
         unknowns.
         """
         shares = self.carried.shares if some is None else self.carried.shares[some]
-        residual[self.carried.dofs] += shares.T @ forces  # each unknown once
+        residual[self.carried.dofs] += shares.T @ forces  # ``dofs`` names each unknown once
 
     @cached_property
     def carried(self) -> "Carried":
@@ -64,7 +64,7 @@ class Carried:
 
 
 def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points, by a rule of ``degree``, on those of the ``facets`` that belong to this rank's own cells."""
+    """The quadrature points of a rule of ``degree`` on those of the ``facets`` that belong to this rank's own cells."""
     kind, msh = basix.CellType[mesh.kind], displacement.space.mesh
     sides = _sides(msh.topology, facets)
     side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral
@@ -86,7 +86,7 @@ def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int
 
 
 def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoints:
-    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): by cell of the body's mesh that of this rank, else -1."""
+    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): the number here of each cell of the body, else -1."""
     mine, msh = np.flatnonzero(local[skin.cells] >= 0), displacement.space.mesh
     cells, points = local[skin.cells[mine]], skin.points[mine]
     within = barycentric(points, msh.geometry.x[msh.geometry.dofmap[cells]])[:, 1:]

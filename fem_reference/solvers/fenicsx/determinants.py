@@ -16,8 +16,8 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 @dataclass(frozen=True)
 class Extreme:
-    """The least or greatest ``value`` over cells, with the ``cell`` of the body and the rest position [mm]. ``where``: the kind of
-    point, empty for means over cells.
+    """The least or greatest ``value`` over cells, with the ``cell`` of the body and the rest position [mm]. ``where`` names the
+    kind of point; it is empty for means over cells.
     """
 
     value: float
@@ -31,9 +31,9 @@ class Extreme:
 
 
 def least(comm: MPI.Comm, values: Floats, cells: Ints, at: Floats, where: str = "", sign: float = 1.0) -> Extreme:
-    """The least of ``sign values`` (n, ...) of all ranks' ``cells`` (n,) ``at`` places (n, ..., 3); NaN counts as least."""
+    """The least ``sign values`` (n, ...) in the ``cells`` (n,) of all ranks, ``at`` places (n, ..., 3); NaN counts as least."""
     mine = Extreme(sign * np.inf, where, -1, (0.0, 0.0, 0.0))
-    if len(cells):  # not so on a rank without cells
+    if len(cells):  # a rank may have none
         i = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, sign * values)), values.shape)
         x, y, z = at[i].tolist()
         mine = Extreme(float(values[i]), where, int(cells[i[0]]), (x, y, z))
@@ -45,10 +45,10 @@ class Determinants:
     """Det F at the quadrature points and the vertices of this rank's cells."""
 
     def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
-        """``cells``: the cell of the body for each of this rank's; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
+        """``cells``: the number in the body of each cell here; ``rule``: the quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         vertices = reference_nodes(kind, 1)
-        # Compiled, as each iteration needs it, and by all ranks together: a rank without cells evaluates it nowhere.
+        # It is compiled, as each iteration needs it, by all ranks together, even those that have no cells.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(vertices, len(cells))
         at_vertices, slopes = geometry(self.mesh, vertices, slice(len(cells)))
@@ -61,7 +61,7 @@ class Determinants:
         return min(found, key=lambda one: (not np.isnan(one.value), one.value))
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Inverted where det F is not positive somewhere."""
+        """The trouble *inverted* where det F is not positive somewhere."""
         smallest = self.smallest()
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
@@ -79,7 +79,7 @@ class Determinants:
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:
-        """Det F by cell of this rank and point of a kind."""
+        """Det F by cell of this rank and by point of one kind."""
         if len(self.cells) == 0:
             return np.zeros(self.rest[where].shape[:2])
         if where == "vertex":

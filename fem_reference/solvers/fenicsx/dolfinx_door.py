@@ -8,8 +8,8 @@ from fem_reference.foundations.errors import MissingSoftware
 __all__ = ["PETSc", "dolfinx"]
 
 
-# FFCx imports numba where it is installed, for kernels that are not used here: a quarter of a process's start-up time. Meanwhile it
-# is as if it were not installed, unless it is loaded already.
+# FFCx imports numba if it is installed, for kernels that are not used here; that takes a quarter of a process's start-up time. So
+# numba is hidden during the import, unless it is loaded already.
 _HIDDEN = "numba" not in sys.modules
 if _HIDDEN:
     sys.modules["numba"] = None  # type: ignore[assignment]
@@ -19,7 +19,7 @@ try:
     import dolfinx
     from petsc4py import PETSc
 
-    # Where numba is loaded, this would make libraries of the wheel global, and h5py take its HDF5 for its own.
+    # Where numba is loaded, this import would make the wheel's libraries global, and h5py would use the wheel's HDF5 for its own.
     if _HIDDEN:
         import dolfinx.fem.petsc
 finally:

@@ -10,9 +10,9 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells
 from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 
-_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and those that places far beyond the edges get
-_LONGEST, _SMALL = 0.5, 1e-14  # steps of it, in reference coordinates
-_BALL = 1.25  # a facet is within so many times the distance of its farthest node from their mean
+_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and for places far beyond the edges
+_LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and one small enough to stop, in reference coordinates
+_BALL = 1.25  # the radius of a ball around a facet, over the distance of its farthest node from the mean of its nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class FacetPlaces:
 
     @property
     def metric(self) -> Floats:
-        """The products (n, 2, 2) [mm2] of the tangents."""
+        """The scalar products (n, 2, 2) [mm2] of the tangents."""
         return self.tangents @ np.swapaxes(self.tangents, 1, 2)
 
     def __getitem__(self, some: Ints) -> "FacetPlaces":
@@ -75,7 +75,7 @@ class Facets:
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
         """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
-        Newton's method from their middles; only roughly where these are far beyond the edges.
+        Newton's method from the middles of the facets; only rough where they are far beyond the edges.
         """
         middle = np.asarray(basix.geometry(self.element.cell_type)).mean(axis=0)
         at, going = np.tile(middle, (len(which), 1)), np.arange(len(which))

@@ -35,8 +35,8 @@ _FUNCTIONS = Functions(ufl.exp, ufl.ln, ufl.sqrt, ufl.cos, ufl.sin, _above)
 
 
 class Derivatives(NamedTuple):
-    """All first derivatives of an energy at the quadrature points, and these with the upper triangle of the second ones:
-    compiled expressions, as ``cells.c`` names them.
+    """Two compiled expressions at the quadrature points: all first derivatives of an energy, and these with the upper triangle of
+    the second ones, in the order of ``cells.c``.
     """
 
     first: Any
@@ -45,17 +45,17 @@ class Derivatives(NamedTuple):
 
 class Form:
     """The weak form of a body. ``derivatives``: those of the energy, with ``kinds`` variables per component of the displacement;
-    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 without;
-    ``stretched``: that of effects that store energy on the surface, 0 without.
+    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 if there
+    are none; ``stretched``: the same for effects that store energy on the surface.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
-    fibres). To be set: the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
-    ``kinetic``: the energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
-    ``degree``; ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
+    fibres). The user sets the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
+    ``kinetic``: the kinetic energy (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``;
+    ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
     """
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
-        """``cells``: the cell of the body for each of this rank's."""
+        """``cells``: the number in the body of each cell of this rank."""
         self.mesh, self.unknowns, self.element = msh, unknowns, settings.element
         self.regions = dict(zip(body.mesh.facets, meshes.local_facets(msh, body.mesh.facets.values()), strict=True))
         self.rule = rule(settings.element, settings.quadrature_degree)
@@ -95,7 +95,7 @@ class Form:
         self.stretched: Any = ufl.derivative(stretched, unknowns) if stretched else 0
 
     def set_amounts(self, frame: float) -> None:
-        """Set the amounts of effects at a frame, and the derivatives of effects that are not zero over whole frames there."""
+        """Set the amounts of effects at a frame, and select the derivatives without the effects that are left out there."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         self.derivatives = self._made[self._quiet(frame)]
@@ -107,7 +107,7 @@ class Form:
     @contextmanager
     def isotropic(self) -> Iterator[None]:
         """A context with the derivatives of the isotropic body that gives a body in situ its stress at rest."""
-        assert self._isotropic is not None  # of a body in situ
+        assert self._isotropic is not None  # a body in situ has it
         own, self.derivatives = self.derivatives, self._isotropic
         try:
             yield
@@ -119,7 +119,7 @@ class Form:
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
-        """The energy of effects that store it on the surface, 0 without; shares in regions are linear between the vertices."""
+        """The energy that effects store on the surface, 0 if none does; shares in regions are linear between the vertices."""
         stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
         shares: dict[str, Any] = {}
         for name in regions_named(stored):
@@ -238,8 +238,8 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
 
 
 def _differentiated(energy: Any, by: tuple[Any, Any, Any], kinds: int) -> tuple[list[Any], list[Any]]:
-    """The first derivatives of ``energy`` by all variables (``kinds`` per component of the displacement, then the pressure), and
-    the upper triangle of the second ones, in the order of ``cells.c``.
+    """The first derivatives of ``energy`` with respect to all variables (``kinds`` per component of the displacement, then the
+    pressure), and the upper triangle of the second ones, in the order of ``cells.c``.
     """
     F, displacement, pressure = by
     variables: list[tuple[Any, tuple[int, ...]]] = [

@@ -1,4 +1,4 @@
-"""Friction of bones: points stick to places of a bone, and drag these along where they slide."""
+"""Friction of bones: points stick to places on a bone, and drag these places along where they slide."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from fem_reference.geometry.rigid_bodies import Sampled
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.problems.friction import returned, since_entry
 
-# From points (m,) their places (m, 3) [mm] in the frame of the bone, and gaps (m,) [mm], in the last settled state.
+# The places (m, 3) [mm] of points (m,) in the frame of the bone, and their gaps (m,) [mm], in the last settled state.
 Before = Callable[[Ints], tuple[Floats, Floats]]
 
 
@@ -28,8 +28,8 @@ class Grip:
 
 
 class Friction:
-    """Friction of one bone by a ``law`` that has some; ``stuck`` (n, 3): the places [mm] in its frame that hold the points, not a
-    number where it does not press.
+    """The friction of one bone by a ``law`` that has a coefficient. ``stuck`` (n, 3): the places [mm] in the frame of the bone that
+    hold the points, NaN for points that it does not press.
     """
 
     def __init__(self, law: ContactLaw, stuck: Floats) -> None:
@@ -38,9 +38,9 @@ class Friction:
     def grip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> Grip:
         """The friction of pressed points ``which`` (n,) at places ``here`` (n, 3) [mm], where gaps and their derivatives are known.
 
-        With the unit normal n and the elastic slip e from the place that holds the point, without its part along n, the traction
-        is ``-min(k |e|, friction p) e/|e|``. A point that came into contact since the settled state slips from where its straight
-        path enters the smoothing.
+        With the unit normal n and the elastic slip e, the vector from the place that holds the point, without its part along n, the
+        traction is ``-min(k |e|, friction p) e/|e|``. A point that has come into contact since the settled state slips from where
+        its straight path comes within the smoothing.
         """
         slip, change = self._slip(which, here, gaps, before)
         length = np.linalg.norm(gaps.gradient, axis=1)
@@ -62,7 +62,7 @@ class Friction:
         return Grip(which, -found.stiffness[:, None] * elastic, slope, here - kept[:, None] * elastic, lost)
 
     def _slip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> tuple[Floats, Floats]:
-        """The way (n, 3) [mm] of the points since they have been held, and its derivative (n, 3, 3) by their places."""
+        """The displacement (n, 3) [mm] of the points from what holds them, and its derivative (n, 3, 3) in their places."""
         slip, change = here - self.stuck[which], np.tile(np.eye(3), (len(which), 1, 1))
         new = np.flatnonzero(np.isnan(slip).any(axis=1))
         if len(new):
@@ -74,13 +74,13 @@ class Friction:
         return slip, change
 
     def settle(self, grip: Grip) -> None:
-        """Hold the points from now on where the ``grip`` has dragged their places to, and no others."""
+        """Hold the points of ``grip`` from now on at the places to which it has dragged theirs, and no other points."""
         self.stuck[:] = np.nan
         self.stuck[grip.which] = grip.stuck
 
 
 def _outer(one: Floats, other: Floats) -> Floats:
-    """The products (n, 3, 3) of vectors (n, 3)."""
+    """The outer products (n, 3, 3) of vectors (n, 3)."""
     return one[:, :, None] * other[:, None, :]
 
 

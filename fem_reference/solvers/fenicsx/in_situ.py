@@ -1,8 +1,8 @@
 """Equilibrium at rest of a body in situ: the stress, the extended springs and the bones' pressure that balance its tension.
 
-All follow from the small displacement of an isotropic body, its ``response`` to the forces of the effects at rest. The body's
-attachments and springs support it, and bones as one-sided springs: a linear problem, but for the points that these touch, which
-Newton's method finds as an active set.
+All follow from the small displacement of an isotropic body, its ``response`` to the forces of the effects at rest. That body is
+supported by its attachments and springs, and by bones that act as one-sided springs: a linear problem once the points that bones
+touch are known, which Newton's method finds as an active set.
 """
 
 import numpy as np
@@ -14,12 +14,12 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.system import System
 
 _MOST = 40  # linear problems
-_TOLERANCE = 1e-12  # of a linear problem, relative
-_SHARE = 1e-2  # of the residual of Newton's method, which remains at most
+_TOLERANCE = 1e-12  # the relative tolerance of a linear problem
+_SHARE = 1e-2  # the remaining residual, as a share of the tolerance of Newton's method
 
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
-    """Find the stress at rest of a ``form``, if it has one, until a small share of the ``residual`` of Newton's method is left.
+    """Find the stress at rest of a ``form``, if it has one, up to a small share of the tolerated ``residual`` of Newton's method.
     ArithmeticError where none is found.
     """
     if form.rest is None:
@@ -29,7 +29,7 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
     for _ in range(_MOST):
         if system.residual() <= _SHARE * residual:
             if contact is not None:
-                contact.look()  # what is pressed at rest feels a bone farther away
+                contact.look()  # points that are pressed at rest have a longer reach
             return
         forces = system.b.copy()
         with form.isotropic():
@@ -51,7 +51,7 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 class Supports:
     """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there, whatever
-    the smoothing. Other points within the smoothing are not pressed at rest.
+    the smoothing. Other points within the smoothing do not count at rest.
     """
 
     def __init__(self, contact: ContactForces) -> None:
@@ -68,7 +68,7 @@ class Supports:
         self.press(np.zeros(len(contact.unknowns.x.array)))
 
     def press(self, response: Floats) -> None:
-        """Make bones press at rest as the springs do at a ``response`` (n,) of the unknowns."""
+        """Make the bones press at rest as their springs do at a ``response`` (n,) of the unknowns."""
         for overlap, near, gap, depth in zip(
             self.contact.overlaps, self.near, self.gaps, self._depths(response), strict=True
         ):
@@ -77,7 +77,7 @@ class Supports:
         self.contact.settle()
 
     def springs(self, response: Floats) -> list[Pressed]:
-        """The contact whose tangent is that of the springs which a ``response`` (n,) of the unknowns does not pull off."""
+        """Contact with the tangent of those springs that stay in touch at a ``response`` (n,) of the unknowns."""
         found = []
         for near, gap, normal, depth in zip(self.near, self.gaps, self.normals, self._depths(response), strict=True):
             some = np.flatnonzero(depth >= 0)
@@ -86,7 +86,7 @@ class Supports:
         return found
 
     def _depths(self, response: Floats) -> list[Floats]:
-        """The depths to which the ``response`` (n,) of the unknowns takes the points, by bone; below 0 where none touches."""
+        """The depths to which the ``response`` (n,) of the unknowns takes the points, by bone; below 0 outside it."""
         moved = self.contact.points.positions(response) - self.contact.points.rest
         placed = zip(self.near, self.normals, self.touch, strict=True)
         return [np.where(touch, -np.einsum("ni,ni->n", moved[near], normal), -np.inf) for near, normal, touch in placed]

@@ -16,8 +16,8 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 
 @dataclass(frozen=True)
 class Kept:
-    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last one, with the
-    others for loads that return. ``mesh``: its fingerprint.
+    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last one, and use the
+    others where the same loads return. ``mesh``: the mesh's fingerprint.
     """
 
     folder: Path
@@ -31,7 +31,7 @@ class Kept:
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
     """The states to continue from; all other files that an earlier process left in the folder are removed. There are none where
-    contact depends on the states before (``Body.remembers``), which are not kept.
+    contact depends on earlier states (``Body.remembers``), which are not kept.
     """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if not body.remembers and _is_of(whole, number))
@@ -51,10 +51,10 @@ def _is_of(whole: Kept, number: int) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose
-    positions are requested. Only a muscle has them, and then forces at edges shared by attachments are divided between these.
-    ``kept``: the states that are kept, if any. InputError where stable states are to be followed with friction: stability under
-    friction is not known.
+    """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
+    are requested. Only a muscle has them; forces at edges that attachments share are then divided between these. ``kept``: the
+    states that are kept, if any. InputError where stable states are to be followed with friction, as stability under friction is
+    not known.
     """
 
     body: Body

@@ -7,19 +7,19 @@ from petsc4py import PETSc
 
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# Numbers of MUMPS's entries: its error; negative pivots; the last front on one process, as its pivots are not counted otherwise;
-# the memory that it may take beyond its estimate, in per cent.
+# Indices of MUMPS's INFOG: the error, and the number of negative pivots. Of its ICNTL: the last front on one process, as its pivots
+# are not counted otherwise; and the memory beyond the estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
-_FLOPS, _ENTRIES = 3, 29  # entries after a factorisation, the former among the real ones
-# Above this size factors are compressed by blocks (BLR), up to an error of 1e-5: half the time of a factorisation at 170 000
-# unknowns, no gain at 16 000. MUMPS's name of it:
+_FLOPS, _ENTRIES = 3, 29  # indices of RINFOG, the operations of a factorisation, and INFOG, the entries of its factors
+# Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). That halves
+# the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
-# A back-substitution takes as long, per entry of the factors, as that many operations of a factorisation: measured on meshes of
-# 16 000 and of 200 000 unknowns.
+# Per entry of the factors, a back-substitution takes as long as this number of operations of a factorisation, as measured on meshes
+# of 16 000 and of 200 000 unknowns.
 _OPERATIONS = 22.0
-_LEAST, _MOST = 12, 80  # Krylov iterations that an old factorisation may take, at any size
+_LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is kept
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
-_EXACT = 1e-10  # a relative residual with which Newton's method stays quadratic
+_EXACT = 1e-10  # the relative residual of an exact solution, with which Newton's method converges quadratically
 _number = count()
 
 
@@ -28,7 +28,7 @@ class LinearSolveError(ArithmeticError):
 
 
 def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
-    """FGMRES with the present ``matrix``, for at most so many iterations; the caller sets its preconditioner."""
+    """FGMRES with the present ``matrix``, for at most ``most`` iterations; the caller sets its preconditioner."""
     krylov = PETSc.KSP().create(matrix.comm)
     krylov.setType("fgmres")
     krylov.setGMRESRestart(most)
@@ -37,7 +37,7 @@ def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
 
 
 def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, most: int, spent: Spent) -> bool:
-    """Solve for ``x`` in at most so many iterations; True where that reaches ``tolerance`` times the norm of ``b``."""
+    """Solve for ``x`` in at most ``most`` iterations; True where the residual falls to ``tolerance`` times the norm of ``b``."""
     with spent.on("krylov"):
         krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
         krylov.solve(b, x)
@@ -46,15 +46,15 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``. With ``lagged`` by FGMRES with an older factorisation; where that took longer than a
-    new one, in one system or in all since, the matrix is factorised again. LDL^T of a symmetric matrix, else LU.
+    """Solves with the present ``matrix``. If ``lagged``, it solves by FGMRES preconditioned with an older factorisation. Once its
+    iterations, for one system or for all since, took longer than a new one, it is replaced. LDL^T of a symmetric matrix, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
         self.matrix, self.symmetric, self.spent = matrix, symmetric, spent
         self.lagged = lagged
         self._choose(precision)
-        self.factorised: int | None = None  # PETSc's count of changes of the matrix, at its last factorisation
+        self.factorised: int | None = None  # PETSc's count of changes of the matrix when it was last factorised
         self.limit = _LEAST
         self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
 
@@ -64,7 +64,7 @@ class Factorised:
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
         self.preconditioner = self.krylov.getPC()
-        self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
+        self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # MUMPS's "cholesky" is LDL^T
         self.preconditioner.setFactorSolverType("mumps")
         self.krylov.setFromOptions()
         self.preconditioner.setFactorSetUpSolverType()
@@ -97,7 +97,7 @@ class Factorised:
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
-            # Read here alone; PETSc warns at its end of an option that nothing has read.
+            # Only this ``setUp`` reads the option; PETSc would warn of one that is still set, but unread, when it ends.
             options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
             options.delValue("pc_precision")
@@ -110,14 +110,14 @@ class Factorised:
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
-        entries = counted if counted > 0 else -1e6 * counted  # MUMPS counts many in millions
+        entries = counted if counted > 0 else -1e6 * counted  # MUMPS gives a large number in millions, with a minus
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` where this fails."""
         if not self.lagged:
             tolerance = _EXACT
-        # A factorisation whose iterations took as long as a new one is replaced: at most twice the time of perfect foresight.
+        # A factorisation whose iterations took as long as a new one is replaced: that takes at most twice the least possible time.
         serves = self.fresh or (self.lagged and self.since < self.limit)
         if self.factorised is not None and serves and self._iterate(b, x, tolerance, self.limit):
             return
@@ -131,8 +131,8 @@ class Factorised:
         return converged
 
     def negative_pivots(self) -> int:
-        """The negative pivots of the present matrix, which is factorised if necessary. Where single precision does not resolve
-        the softest directions, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
+        """The number of negative pivots of the present matrix, which is factorised if necessary. Where single precision does not
+        resolve the softest directions, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
         """
         if not self.fresh:
             self.factorise()
@@ -142,8 +142,8 @@ class Factorised:
         return int(self.factors.getMumpsInfog(_NEGATIVE))
 
     def _resolved(self) -> bool:
-        """True where the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them
-        by inverse iteration, M^-1 A v equals v up to a tenth. So none of them can have another sign in M.
+        """True where the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them by
+        inverse iteration, M^-1 A v equals v up to a tenth. So along none of them can M and A differ in sign.
         """
         random = np.random.default_rng(self.matrix.comm.rank)
         image = self.matrix.createVecLeft()

@@ -1,5 +1,5 @@
-"""A body's mesh in DOLFINx: distributed over ranks, with its regions, quadrature rules and unknowns, and positions and unknowns at
-reference points from tabulated basis functions, which need no compilation.
+"""A body's mesh in DOLFINx, distributed over ranks, with its regions, quadrature rules and unknowns. Tabulated basis functions,
+which need no compilation, give positions and unknowns at reference points.
 """
 
 from collections.abc import Iterable
@@ -15,10 +15,11 @@ from mpi4py import MPI
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 
-# By element: the degree up to which polynomials on a straight cell are integrated exactly.
+# For each element, the degree up to which polynomials on a straight cell are integrated exactly.
 DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
 
-# Shares of the volume and barycentric coordinates of the orbits of a rule of degree 5 that includes the vertices.
+# A rule of degree 5 that includes the vertices: a vertex's share of the volume, then the shares and barycentric coordinates of
+# orbits.
 _VERTEX_SHARE = 0.002
 _ON_MEDIANS = ((0.11990832171874463, 0.3141518976943535), (0.09393542311163477, 0.10944719170192463))
 _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
@@ -28,8 +29,8 @@ def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
     """Points (q, 3) and weights (q,) on the reference cell of an element, of ``degree`` or, where it is None, of ``DEGREE``.
 
     On quadratic tetrahedra the default rule includes the vertices. There det F of a quadratic displacement is smallest in an
-    inverting cell, and an energy that grows without bound as det F falls to zero keeps it positive where it is evaluated.
-    Standard rules leave the vertices out.
+    inverting cell, and an energy that grows without bound as det F falls to zero keeps det F positive where the energy is
+    evaluated. Standard rules leave the vertices out.
     """
     kind, order, _ = ELEMENTS[element]
     if degree is None and kind == "tetrahedron" and order == 2:
@@ -41,8 +42,8 @@ def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
 def with_vertices() -> tuple[Floats, Floats]:
     """18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
 
-    Its shares and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given share of a vertex;
-    without it they are those of Walkington 2000, Quadrature on simplices of arbitrary dimension.
+    The shares and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given share of a vertex;
+    for a share of 0 they are those of Walkington 2000, Quadrature on simplices of arbitrary dimension.
     """
     points, weights = [np.eye(4, 3, -1)], [np.full(4, _VERTEX_SHARE)]
     for share, a in _ON_MEDIANS:
@@ -98,7 +99,7 @@ class Displacement:
         self.dofs: Ints = np.reshape(np.asarray(parents, np.int64), (-1, 3))
 
     def tabulated(self, points: Floats, count: int) -> Tabulated:
-        """At reference ``points`` (q, 3) of the first ``count`` cells."""
+        """The displacement at reference ``points`` (q, 3) of the first ``count`` cells."""
         return tabulate(self.space, self.dofs[self.space.dofmap.list[:count]], points)
 
 
@@ -130,14 +131,14 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
 
 
 def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
-    """The measure of this rank's facets for a ``degree`` of quadrature; its subdomains are the numbers of the regions."""
+    """The measure of this rank's facets with quadrature of a ``degree``; its subdomains are numbered as the regions are."""
     kind = fem.IntegralType.exterior_facet
     parts = [(i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions)]
     return ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree})
 
 
 def unknowns(msh: mesh.Mesh, element: str) -> fem.Function:
-    """Displacement, and pressure where the element has one."""
+    """The unknowns of a body: displacement, and pressure where the element has one."""
     kind, degree, pressure = ELEMENTS[element]
     parts = [basix.ufl.element("Lagrange", kind, degree, shape=(3,))]
     if pressure is not None:

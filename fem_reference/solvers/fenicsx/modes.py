@@ -1,4 +1,4 @@
-"""The softest mode of a body: departures along it from an unstable equilibrium, and limit points at which its stiffness is 0.
+"""The softest mode of a body: departures along it from an unstable equilibrium, and limit points, at which its stiffness is 0.
 
 At a limit point the path of equilibria ends: at a later frame there is no equilibrium nearby.
 """
@@ -14,11 +14,12 @@ from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 
-_ITERATIONS = 40  # of inverse iteration
+_ITERATIONS = 40  # iterations of inverse iteration
 _LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn where the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
-_DIFFERENCE = 1e-3  # the share of the smallest load step over which slopes are taken
-# In smallest load steps. One that failed was up to two of them, and the distance is known up to a factor.
+_DIFFERENCE = 1e-3  # of the smallest load step: the interval for differences along the path
+# The greatest reported distance to a limit point, in smallest load steps. The step that failed was up to two of them long, and the
+# distance is known only up to a factor.
 _NEAR = 4
 _SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode keeps near a limit point.
 
@@ -26,7 +27,7 @@ _SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
     """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
 
-    Inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` where no unknown is free to move.
+    It is found by inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` where none is free.
     """
     moves = _free(body)
     if not body.comm.allreduce(moves.any(), MPI.LOR):
@@ -44,7 +45,7 @@ def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
 
 
 def _free(body: AssembledBody) -> Floats:
-    """1 for each displacement of this rank's own that is not prescribed, 0 for every other unknown."""
+    """A vector with 1 for each displacement that this rank owns and none prescribes, 0 for every other unknown."""
     free = np.zeros(body.system.size)
     free[body.displacement.dofs.ravel()] = 1.0
     free[body.system.fixed] = 0.0
@@ -59,8 +60,8 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
-    """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again
-    until there are fewer negative modes. The perturbation [mm]; None where the state is stable or no other was found. Collective.
+    """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until
+    there are fewer negative modes. Returns the perturbation [mm], None where the state is stable or no other was found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -81,8 +82,8 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 
 def _lowest(body: AssembledBody, pressures: int) -> Floats:
-    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most. Inverse iteration, with a shift
-    that makes the tangent definite but for its ``pressures``.
+    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most, by inverse iteration with a shift
+    that leaves the tangent no negative pivots but those of its ``pressures``.
     """
     system, free, dofs = body.system, _free(body), body.displacement.dofs
     system.linearise()
@@ -110,7 +111,7 @@ def _shifted(body: AssembledBody, shift: Floats) -> Factorised:
 
 @dataclass(frozen=True)
 class LimitPoint:
-    """The ``frame`` of a limit point, and the rest position [mm] where its mode moves most."""
+    """The ``frame`` of a limit point, and the rest position ``at`` [mm] at which the softest mode moves most."""
 
     frame: float
     at: tuple[float, float, float]
@@ -118,7 +119,7 @@ class LimitPoint:
     def __str__(self) -> str:
         return (
             f"the equilibrium comes to a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
-            f"largest at {place_of(self.at)}, is 0: no state is near beyond it, and what follows is a snap"
+            f"largest at {place_of(self.at)}, is 0: beyond it there is no equilibrium nearby, and the body snaps"
         )
 
 
@@ -127,7 +128,7 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
     none or it cannot be known. Collective.
 
     Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is
-    linear, and the remaining path is half of the eigenvalue over its slope along the path. The slope is that of a Newton step.
+    linear, and the remaining path is half of the eigenvalue divided by its slope along the path, that of a Newton step.
     """
     if body.stability is None or body.clock.matters:
         return None
@@ -146,7 +147,7 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     system, now, ends = body.system, body.unknowns.x.array, []
     start = np.array(now)
     body.set_frame(body.at)
-    # Without contact, and at rest.
+    # The stiffness at rest and without contact, for comparison.
     now[:], system.contact = 0, None
     system.linearise()
     at_rest = _stiffness(body, softest(body, body.linear))

@@ -1,9 +1,9 @@
 """Linear systems too large for a factorisation: FGMRES with two levels of elements, P2 and P1.
 
-The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). Displacement block: one
-cycle between the quadratic and the linear element on the same cells, with Chebyshev smoothing and a factorised coarse level.
-Pressure block: the mass matrix over local stiffness, which is spectrally equivalent to the Schur complement
-(Wathen and Silvester 1993, doi 10.1137/0730031).
+The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). Displacement block: one cycle
+between the quadratic and the linear element on the same cells, with Chebyshev smoothing and a factorised coarse level. Pressure
+block: the mass matrix divided by local stiffness, which is spectrally equivalent to the Schur complement (Wathen and Silvester
+1993, doi 10.1137/0730031).
 """
 
 from typing import Any
@@ -18,9 +18,9 @@ from fem_reference.foundations.mesh import Ints
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, fgmres, iterate
 from fem_reference.solvers.fenicsx.system import System
 
-_SMOOTHING = 2  # the degree of the polynomial
-_MOST = 200  # iterations; also the excess over a fresh preconditioner that is still accepted
-_STALE = 15
+_SMOOTHING = 2  # the degree of the Chebyshev polynomial
+_MOST = 200  # the greatest number of iterations
+_STALE = 15  # iterations up to which a preconditioner is never stale
 
 
 class Multigrid:
@@ -32,7 +32,7 @@ class Multigrid:
         displaced = np.unique(cells.unknowns[:, : 3 * cells.nodes])
         pressures = np.unique(cells.unknowns[:, 3 * cells.nodes :])
         self.sets = [PETSc.IS().createGeneral(names.tolist()) for names in (displaced, pressures)]
-        self.number = np.zeros(system.size, np.int64)  # of an unknown in its block
+        self.number = np.zeros(system.size, np.int64)  # the number of each unknown within its block
         self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
         self.coarse, self.fixed = self._interpolation(displaced.astype(np.int64))
         self.krylov = fgmres(self.matrix, _MOST)
@@ -55,7 +55,7 @@ class Multigrid:
             raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
 
     def solve_exactly(self) -> bool:
-        """False, as memory does not suffice for a factorisation."""
+        """Return False: memory does not suffice for a factorisation."""
         return False
 
     def _renew(self) -> None:
@@ -63,7 +63,7 @@ class Multigrid:
         the remaining forces.
         """
         with self.spent.on("factorisation"):
-            kinds: Any = PETSc.PC  # its stubs call their members numbers
+            kinds: Any = PETSc.PC  # the stubs declare its members as numbers
             blocks = PETSc.PC().create(self.matrix.comm)
             blocks.setOperators(self.matrix, self.matrix)
             blocks.setType("fieldsplit")
@@ -84,7 +84,7 @@ class Multigrid:
         self.stale = False
 
     def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
-        """One cycle between the two elements."""
+        """The preconditioner of one cycle between the two elements."""
         coarse = stiff.ptap(self.coarse)
         coarse.zeroRowsColumns(self.fixed.tolist(), diag=1.0)
         stiff.setBlockSizes(3, 3)  # the components of a node are neighbours
@@ -108,8 +108,8 @@ class Multigrid:
         return cycle
 
     def _interpolation(self, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
-        """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the unknowns
-        of the linear element that are fixed: those at corners where the quadratic one is.
+        """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the fixed
+        unknowns of the linear element: those at corners where the quadratic element's is fixed.
         """
         space, parents = self.system.unknowns.function_space.sub(0).collapse()
         corners = interpolation_matrix(fem.functionspace(space.mesh, ("Lagrange", 1, (3,))), space)
@@ -123,7 +123,7 @@ class Multigrid:
         return self._matrix(csr_array(found)), fixed
 
     def _schur(self) -> PETSc.Mat:
-        """Minus the mass matrix of the pressure over local stiffness, in place of the Schur complement."""
+        """Minus the mass matrix of the pressure, divided by local stiffness, in place of the Schur complement."""
         system, cells = self.system, self.system.cells
         blocks = cells.softness() * system.tangent.unit**2
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]

@@ -12,20 +12,21 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.system import System
 
-# A step is halved until det F keeps this share of itself everywhere, or down to this length, at which its next state is checked.
+# A step is halved until det F keeps this share of its value everywhere, but at most down to this share of the full step.
 _KEPT, _SHORTEST = 0.1, 1e-2
-# Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, its factor and its bounds.
+# Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
+# tolerances and their bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
-# Newton gives up if the residual did not fall to this share of its earlier best within so many iterations.
+# Newton's method gives up if within ``_PATIENCE`` iterations the residual did not fall to ``_PROGRESS`` times its earlier best.
 _PATIENCE, _PROGRESS = 6, 0.5
-# Where a linear solution would end below the target of Newton's method, it continues to this share of the target: the residual
-# of the last system is the residual of all.
+# A linear solution that would end below the target of Newton's method goes on to this share of the target: the residual of the last
+# linear system is that of the whole iteration.
 _PAST = 1e-2
 
 
 class Newton:
-    """Newton's method on a ``system``, by full steps of ``linear``. A line search would weigh forces [N] against volumes [mm3],
-    and it stalls where bodies bend or are soft.
+    """Newton's method on a ``system``, in full steps by ``linear``. A line search would weigh forces [N] against volumes [mm3], and
+    would stall where bodies bend or are soft.
     """
 
     def __init__(
@@ -38,8 +39,8 @@ class Newton:
 
     def solve_among(self, contact: ContactForces | None, frame: float) -> Attempt:
         """Solve as ``solve`` does; first without ``contact`` where the present state has no contact pressure. That result stands
-        where it converged without contact pressure: contact would give the same one. Else it is discarded, and its iterations
-        count as ``thrown``, as they are no sign of how hard the load step is.
+        where it converged without contact pressure: contact would give the same one. Else it is discarded, and its iterations count
+        as ``thrown``, as they do not show how hard the load step is.
         """
         system, before = self.system, np.array(self.system.unknowns.x.array)
         system.contact = contact if contact and contact.presses() else None
@@ -58,7 +59,7 @@ class Newton:
         return self.solve(frame)
 
     def solve(self, frame: float) -> Attempt:
-        """Solve at ``frame``. The attempt ends where every step inverts a cell."""
+        """Solve at ``frame``. The attempt ends where even the shortest step inverts a cell."""
         smallest, last = self.determinants.values_now(), np.nan
         residuals = [self._begin(frame)]
         while not residuals[-1] <= self.residual or self.system.lacking():
@@ -96,15 +97,15 @@ class Newton:
         return Attempt(status, len(residuals) - 1, tuple(residuals), f"Newton's method {why}")
 
     def _begin(self, frame: float) -> float:
-        """Assemble the first iteration's system. Bones at their next poses would meet points that have not moved yet, and
-        meaningless forces would mislead it. So it uses the contact pressures of the last state, and is linear in the motion of
-        the bones.
+        """Assemble the first iteration's system. Bones at their next poses would overlap points that have not moved yet, and the
+        iteration would start from meaningless forces. So this system has the contact pressures of the last state, linear in the
+        motion of the bones.
         """
         moves = -self.system.missing()
         if self.system.contact is None:
             return self._linearise(moves)
         norm = self._linearise(moves, self.system.contact.predicted(frame, moves))
-        if norm <= self.residual:  # nothing moves by itself, and only the new gaps show it
+        if norm <= self.residual:  # nothing else drives a step, and only the new gaps show contact
             self._meet(frame)
             norm = self._linearise(moves)
         return norm
@@ -122,14 +123,14 @@ class Newton:
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        # Pressures have less weight in linear systems.
+        # Linear systems weigh the residual of pressures by their unit.
         enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)
         return max(wanted, 1e-13)
 
     def _take(self, smallest: Floats) -> Floats:
-        """Take the step, shortened as det F requires; det F afterwards."""
+        """Take the step, shortened as det F requires, and return det F after it."""
         unknowns, owned = self.system.unknowns.x, self.system.owned
         before, share = np.array(unknowns.array), 1.0
         step = np.where(self.system.fixed, self.system.missing(), 0.0)
@@ -145,7 +146,7 @@ class Newton:
 
 
 def stalled(residuals: list[float]) -> int:
-    """The number of the last ``residuals`` since one fell to half of the earlier best.
+    """The number of the last ``residuals`` since one fell to half of the best before it.
 
     >>> stalled([1.0]), stalled([1.0, 0.4, 0.1]), stalled([1.0, 0.4, 0.3, 2.0])
     (0, 0, 2)

@@ -18,7 +18,7 @@ class Nodal:
     def __init__(
         self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock, rest: RestStress | None
     ) -> None:
-        """``own``: the cells that are this rank's, in the rank's order."""
+        """``own``: the numbers of this rank's cells in the body, in the order of the rank."""
         kind, degree, order = ELEMENTS[element]
         self.cells, self.own, self.clock, self.unknowns = cells, own, clock, displacement.unknowns.x
         self.rest = rest
@@ -60,7 +60,7 @@ class Nodal:
         return self.gathered(self.pressure.at(unknowns)[..., 0])
 
     def gathered(self, mine: Floats | Ints) -> Floats:
-        """The rows of all cells (m, ...) from those of this rank's own, on every rank."""
+        """The rows of all cells (m, ...), on every rank, gathered from those of each rank's own cells."""
         gathered = np.zeros((len(self.cells.cells), *mine.shape[1:]))
         for own, part in self.comm.allgather((self.own, mine)):
             gathered[own] = part

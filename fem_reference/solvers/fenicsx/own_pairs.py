@@ -8,12 +8,12 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx.facets import Facets
 
-# Facets whose normals agree more than this do not face each other; others may somewhere, as they bend.
+# Facets do not face each other where the cosine between their normals is above this; others may in places, as they bend.
 _ALIKE = 0.5
 
 
 class OwnPairs:
-    """Pairs of ``facets`` of one part."""
+    """Finds pairs among the ``facets`` of one part."""
 
     def __init__(self, facets: Facets) -> None:
         self.facets, self.count = facets, len(facets.rest)
@@ -26,8 +26,8 @@ class OwnPairs:
         return np.asarray(self.next_to[one, other]).ravel() if len(one) else np.zeros(0, bool)
 
     def near(self, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """The facets (p,) whose ``balls``, middles (m, 3) and radii (m,) [mm], come within ``reach`` (m,) of the middles of others
-        (p,) that they face in one of the ``states``, nodes (m, k, 3) [mm], and do not share a node with.
+        """The facets (p,) whose ``balls``, middles (m, 3) and radii (m,) [mm], come within ``reach`` (m,) of the middles of other
+        facets (p,): those that they face in one of the ``states``, nodes (m, k, 3) [mm], and share no node with.
         """
         middles, radii = balls
         found = cKDTree(middles).query_ball_point(middles, reach + radii.max())

@@ -12,22 +12,22 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
-# On the straight line from one state to the next, det F, a cubic of the share of the line, keeps this share of the
-# lesser end value. A turn by 143 degrees within a step reduces it to a tenth; half a turn, or a mirrored state on the
-# line, to 0 or below.
+# On the straight line from one state to the next, det F is a cubic along the line and has to stay above this share of the lesser of
+# its end values. A turn by 143 degrees within a step reduces it to a tenth; half a turn, or a mirrored state on the line, to 0 or
+# below.
 KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
 
-# Loads and boundary conditions are the same if none differs by more than the rounding of a returning motion (mm, and entries of a
-# pose).
+# Loads and boundary conditions count as the same if none differs by more than the rounding of a returning motion (in mm, and in
+# entries of a pose).
 _SAME = 1e-9
-# States are kept up to this memory [bytes] on each rank, the latest ones.
+# The latest states are kept, up to this memory [bytes] on each rank.
 _MOST = 512e6
 
 
 class Path:
-    """Watches the successive states of a ``system`` for jumps, without any other solution. Its methods are collective."""
+    """Watches the successive states of a ``system`` for jumps, without solving for any other state. Its methods are collective."""
 
     def __init__(self, system: System, determinants: Determinants) -> None:
         self.system, self.determinants = system, determinants
@@ -35,8 +35,8 @@ class Path:
         self.unknowns, self.forces = np.array(system.unknowns.x.array), self.system.reactions(inside=True)
 
     def jumped(self, before: Floats) -> Extreme | None:
-        """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones;
-        None unless it is next to nothing. A body that deforms steadily in small steps never gets there.
+        """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones; None
+        where more than ``KEPT`` is left. A body that deforms steadily in small steps never falls that low.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -49,23 +49,23 @@ class Path:
         return None if found.value > KEPT else found
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """Diverged where the step from the unknowns ``before`` leads to another path."""
+        """The trouble *diverged* where the step from the unknowns ``before`` leads to another path."""
         jump = self.jumped(before)
         if jump is None:
             return None
         place = f"in cell {jump.cell} at {place_of(jump.at)}"
-        way = "on the straight way from the last one det F falls to"
+        way = "on the straight line from the last one det F falls to"
         return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of itself, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
-        """Take the present state as the next one, with the stored ``energy`` [N mm]; where it is ``connected`` with the one
+        """Take the present state as the next one, with the stored ``energy`` [N mm]; where it is ``connected`` with the state
         before, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
         The rule is exact where forces are linear in the displacement, and its error falls with the square of the step: for a law
-        that stiffens, or a rotation, it is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` a
-        state ``halfway`` is solved for (the function says if it was found; the unknowns are its own then, and restored
-        afterwards), and Simpson's rule applies, whose error falls with the fourth power. In a jump the energy falls without work,
-        by any rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
+        that stiffens, or a rotation, it is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` the
+        function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored afterwards, and returns True
+        if it was found. Then Simpson's rule applies, whose error falls with the fourth power. In a jump the energy falls without
+        work, by either rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
         """
         states = [
             (self.unknowns, self.forces),
@@ -82,8 +82,8 @@ class Path:
         self.energy, (self.unknowns, self.forces) = energy, states[-1]
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
-        """The growth of the energy without work up to the last of ``states`` (unknowns and forces), over the greatest so far;
-        there are two states, or three at equal distances of time.
+        """The growth of the energy that no work explains, up to the last of ``states`` (unknowns and forces), divided by the
+        greatest energy so far; there are two states, or three at equal intervals of time.
         """
         own = self.system.owned
         work = sum(float(np.dot(forces[:own], moves[:own])) for forces, moves in _products(states))
@@ -91,14 +91,14 @@ class Path:
         return (energy - self.energy - work) / self.greatest
 
     def take_gap(self) -> float:
-        """The gap, which is reset to 0."""
+        """Return the gap and reset it to 0."""
         gap, self.gap = self.gap, 0.0
         return gap
 
 
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
     """Forces, and the displacements along which they work: straight lines between two ``states``, or parabolas over time through
-    three. Along these the integral is that of Simpson's rule, which is exact for them.
+    three. The work along these is that of Simpson's rule, which is exact for them.
     """
     if len(states) == 2:
         (start, first), (end, last) = states
@@ -118,7 +118,7 @@ def least(values: Floats) -> Floats:
     found = np.minimum(values[0], values[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b**2 - 3 * a * c)
-        # The turning points; each has a second form that holds where the cubic term is next to none.
+        # The turning points; each in a second form too, which holds where the cubic term almost vanishes.
         turns = [-c / (b + root), -c / (b - root), (-b + root) / (3 * a), (-b - root) / (3 * a)]
     for turn in turns:
         inside = np.isfinite(turn) & (turn > 0) & (turn < 1)
@@ -137,14 +137,14 @@ class KnownState:
 
 
 class Known:
-    """The states of a run so far, the same on all ranks of ``comm``."""
+    """The states of a run so far; which ones are kept is the same on all ranks of ``comm``."""
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm
         self.states: list[KnownState] = []
 
     def add(self, state: KnownState) -> None:
-        """Keep a state; it is in equilibrium."""
+        """Keep a state, which is in equilibrium."""
         self.states.append(state)
         size = self.comm.allreduce(state.unknowns.nbytes + state.acting.nbytes, MPI.MAX)
         del self.states[: max(0, len(self.states) - max(1, int(_MOST / size)))]

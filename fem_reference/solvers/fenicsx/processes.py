@@ -19,7 +19,8 @@ from fem_reference.foundations.subprocesses import command, environment, process
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
 
-# One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless set otherwise.
+# One thread per rank. Unless these variables are set, Open MPI, where it is used, refuses to run as root or with more ranks than
+# cores.
 _SETTINGS = {
     "OMP_NUM_THREADS": "1",
     "PYTHONUNBUFFERED": "1",
@@ -27,14 +28,13 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-# The number of ranks that any machine accepts; more are accepted only with as many cores.
+# The number of ranks that is accepted on any machine; more are accepted only on a machine with as many cores.
 _MOST_RANKS = 8
-PATIENCE = 5.0  # [s] from the request to end a process until it is killed
-# Clock time that may pass, as a multiple of a limit of processor time and of the start-up: beyond it the machine is too busy
-# for any conclusion.
+PATIENCE = 5.0  # [s] between the request to end a process and its being killed
+# The allowed clock time, as a multiple of the limit of processor time plus the start-up time; a run beyond it allows no conclusion.
 CLOCK, _START = 20, 3.0  # [s]
-_GLANCE = 0.02  # [s]
-MARK = "@fem_reference "  # begins each line of output that names a file with a pickled frame or outcome
+_GLANCE = 0.02  # [s] between looks at the processor time
+MARK = "@fem_reference "  # begins each line of output that names the file of a pickled frame or outcome
 
 
 def installed() -> bool:
@@ -50,14 +50,14 @@ def require_installed() -> None:
 
 
 def mpiexec() -> str | None:
-    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, which may not fit; None where there is none."""
+    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, maybe of another MPI; None where there is none."""
     beside = Path(sys.executable).with_name("mpiexec")
     return str(beside) if beside.exists() else shutil.which("mpiexec")
 
 
 def command_line(ranks: int) -> list[str]:
-    """The worker's command line. InputError for more ranks than the machine takes, MissingSoftware without ``mpiexec``."""
-    # mpi4py's own runner ends all ranks after an error on one; without it the others wait forever.
+    """The worker's command line. InputError for more ranks than this machine accepts, MissingSoftware without ``mpiexec``."""
+    # mpi4py's own runner ends all ranks after an error on one; without the runner the others would wait forever.
     worker, runner = command("-m", "mpi4py", "-m", f"{__package__}.worker"), mpiexec()
     if ranks == 1:
         return worker
@@ -69,7 +69,7 @@ def command_line(ranks: int) -> list[str]:
 
 
 class Process:
-    """A process started by the command ``words``. It reads the names of job files, one a line; its error output is read
+    """A process started by the command ``words``. It reads the names of job files, one per line; its error output is read
     continuously.
     """
 
@@ -87,12 +87,12 @@ class Process:
         self.listener.start()
 
     def solve(self, job: Path, time_limit: float | None, sink: Sink) -> Outcome:
-        """Solve the job in a file and sink each frame. The outcome of a process that dies is *crashed*; of one over the time limit,
-        which is ended, *timed out* or *stalled*.
+        """Solve the job in a file and pass each frame to ``sink``. The outcome of a process that dies is *crashed*; a process over
+        the time limit is ended, and the outcome is *timed out* or *stalled*.
         """
         kept = "no frame was reached"
         with self._limited(time_limit):
-            with suppress(BrokenPipeError):  # a dead process does not read it, and its exit status shows that
+            with suppress(BrokenPipeError):  # a dead process reads nothing; its exit status is looked at below
                 self.input.write(f"{job}\n")
                 self.input.flush()
             for line in self.output:
@@ -115,12 +115,12 @@ class Process:
     def _reason(self) -> str:
         """The most informative line of its error output: the last that names an error, else the last."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
-        return (named or self.errors or ["without a word"])[-1].strip()
+        return (named or self.errors or ["without a message"])[-1].strip()
 
     @contextmanager
     def _limited(self, time_limit: float | None) -> Iterator[None]:
         """End it where one of its processes meanwhile takes more than ``time_limit`` [s] of processor time, independent of other
-        load on the machine. ``CLOCK`` times that by the clock ends it too, without a conclusion about the work.
+        load on the machine. After ``CLOCK`` times that by the clock it is ended too, which allows no conclusion.
         """
         if time_limit is None:
             yield
@@ -132,7 +132,7 @@ class Process:
             yield
         finally:
             done.set()
-            watching.join()  # if it has begun to end the process, that is over after this
+            watching.join()  # if the watch has begun to end the process, it finishes that first
 
     def _watch(self, time_limit: float, done: threading.Event) -> None:
         begin = time.monotonic()
@@ -146,7 +146,7 @@ class Process:
             elif passed >= longest:
                 why = (
                     f"stopped after {passed:.3g} s in which it had {used:.3g} s of processor time, of the {time_limit:g} s that "
-                    "it may take: the machine was busy, or something waited; that says nothing of what was solved"
+                    "it may take: the machine was busy, or a process waited; nothing follows about the solution"
                 )
                 self.overran = "stalled", why
             elif done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):
@@ -155,7 +155,7 @@ class Process:
         self._stop()
 
     def _stop(self) -> None:
-        """Ask it repeatedly to end, as mpiexec ignores a signal before its own processes start; kill it in the end."""
+        """Ask the process repeatedly to end, as mpiexec ignores signals until its own processes have started; finally kill it."""
         asked = time.monotonic()
         while self.process.poll() is None:
             patient = time.monotonic() - asked < PATIENCE
@@ -164,13 +164,13 @@ class Process:
                 self.process.wait(timeout=0.5)
 
     def finish(self) -> None:
-        """Let it end by itself, as there are no more jobs."""
+        """Let the process end by itself, as there are no more jobs."""
         with suppress(BrokenPipeError):
             self.input.close()
         self.process.wait()
 
     def end(self) -> None:
-        """End it at once."""
+        """End the process at once."""
         self._stop()
         self.listener.join()
         for stream in (self.input, self.output, self.error_output):

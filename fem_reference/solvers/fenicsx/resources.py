@@ -12,17 +12,17 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
-# Below this number of unknowns a factorisation costs no more than a few iterations of any other solver.
+# Below this number of unknowns a factorisation costs no more than a few iterations of an iterative solver.
 SMALL = 4000
 # From this number of unknowns on, multigrid is faster than one factorisation per frame.
 LARGE = 350_000
-# Megabytes of a process without a body, of each unknown besides factors (with multigrid, of each unknown in all), and
-# of factors in double precision of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to
-# 560 000 unknowns. MUMPS allocates more than it uses.
+# Memory [MB] of a process without a body, of each unknown besides its factors, of each unknown in all with multigrid, and of the
+# factors of 16 000 unknowns in double precision; and the power by which these grow. Measured on gluteus_maximus from 16 000 to 560
+# 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The most bytes of states, over all frames, that a run keeps by default.
 MOST_STATES = 2**26
-# From this number of unknowns on, a second rank saves time, where a core is free for it.
+# From this number of unknowns on, a second rank saves time, if a core is free for it.
 _WORTH_RANKS = 20_000
 _GLANCE = 0.2  # [s] over which the load of the cores is measured
 
@@ -35,7 +35,7 @@ def unknowns(cells: Cells, element: str) -> int:
     pressures = {None: 0, 0: len(corners), 1: count}[pressure]
     if degree == 2:
         if kind == "hexahedron":
-            count *= 8  # as many edges, faces and cells as in a large grid
+            count *= 8  # there are this many edges, faces and cells per vertex in a large grid
         else:
             pairs = np.concatenate([np.sort(corners[:, pair], axis=1) for pair in combinations(range(4), 2)])
             count += len(np.unique(pairs[:, 0].astype(np.int64) * (corners.max() + 1) + pairs[:, 1]))
@@ -69,7 +69,7 @@ def available() -> float:
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
     """The settings with a linear solver and its precision: the requested ones, or those that the size suggests and that fit into
-    the ``free`` megabytes. InputError where nothing fits.
+    the ``free`` megabytes. InputError where none fits.
     """
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
@@ -90,7 +90,7 @@ def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "mult
 
 
 def idle_cores() -> int:
-    """The number of idle cores among those of this process; all of them where the system does not report it."""
+    """The number of idle cores among those that this process may use; all of them where the system does not report their load."""
     mine = os.sched_getaffinity(0)
     try:
         before, begin = _idle(mine), time.perf_counter()

@@ -1,4 +1,4 @@
-"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have done.
+"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have.
 
 <run>/restart/frame_0010.npz   the unknowns and the arrays of the clock, (n,) in the order of the body's cells; ``facts``, in JSON
 """
@@ -21,13 +21,13 @@ class Restart:
         self.body, self.kept = body, kept
         dofmap = body.unknowns.function_space.dofmap
         names = np.asarray(dofmap.list, np.int64)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, shared ones too
+        self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, ghosts included
         self.cells = np.asarray(body.mesh.topology.original_cell_index, np.int64)[: len(names)]
         self.numbers = self._numbers()
-        self.note = ""  # on a run that continues with other effects
+        self.note = ""  # for a run that continues with other effects
 
     def _numbers(self) -> Ints:
-        """The number of each unknown (m, u) of all cells, by its first appearance in them: the same on any ranks."""
+        """The number of each unknown (m, u) of all cells, by order of first appearance: the same on any number of ranks."""
         dofmap = self.body.unknowns.function_space.dofmap
         blocks, components = np.divmod(self.dofs[: len(self.body.cells)], dofmap.index_map_bs)
         everywhere = dofmap.index_map.local_to_global(blocks.ravel().astype(np.int32)).reshape(blocks.shape)
@@ -50,7 +50,7 @@ class Restart:
         return " ".join([*map(repr, self.body.effects), law])
 
     def write(self, frame: float, facts: dict[str, Any]) -> None:
-        """Store the present state, that of ``frame``, with the facts of the run until then."""
+        """Store the present state, that of ``frame``, with the facts on the run so far."""
         body = self.body
         arrays = {"unknowns": body.unknowns.x.array} | body.clock.arrays()
         stored: dict[str, Any] = {name: self._gathered(values) for name, values in arrays.items()}
@@ -61,8 +61,8 @@ class Restart:
             write_arrays(self.kept.place(frame), stored)
 
     def good(self) -> tuple[int, ...]:
-        """The frames of the states to continue from: all of them. If other effects acted in them, those up to the first that is
-        not in equilibrium now, and none where time matters. The body is restored afterwards.
+        """The frames of the states to continue from: all of them; if other effects acted then, only those before the first that is
+        no longer in equilibrium, and none where rates matter. The body is restored afterwards.
         """
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at
@@ -91,7 +91,7 @@ class Restart:
         return mine, facts
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
-        """Take up the state of the last of the ``frames`` and register the others; the facts stored with it."""
+        """Take up the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
             arrays, facts = self._read(frame)

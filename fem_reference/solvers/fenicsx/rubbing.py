@@ -1,6 +1,6 @@
-"""Friction between parts of a surface: points of one side stick to places on the facets of the other, and slide from there.
+"""Friction between parts of a surface: points of one side stick to places on the facets of the other, or slide along these.
 
-Slip is counted in the coordinates of a facet, which move with it: a rigid motion changes none, so that forces and moments balance.
+Slip is counted in the coordinates of a facet, which move with it: a rigid motion changes none, so forces and moments balance.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ _THIRD = np.array([[[6, 7], [7, 8]], [[7, 8], [8, 9]]])
 
 @dataclass(frozen=True, eq=False)
 class Rubbed:
-    """Friction of n points: by the unknowns ``dofs`` (n, a) the ``rows`` (n, 12, a) of the changes of x - y (3), of both slopes of
-    the facet (3 each), and of its second slopes along the normal (3); their forces ``pull`` (n, 12) [N], and the derivative
-    ``second`` (n, 12, 12) of these with the sign of a second derivative of an energy. ``held`` (n, 2): the coordinates of the
-    places that hold the points, on the facets they are at; the work ``lost`` (n,) [N mm]; ``far`` (n,): slid beyond a facet.
+    """Friction of n points. Twelve quantities depend on the unknowns ``dofs`` (n, a) with derivatives ``rows`` (n, 12, a): x - y
+    (3), both slopes of the facet (3 each), and its second slopes along the normal (3). ``pull`` (n, 12) [N]: the forces along
+    these; ``second`` (n, 12, 12): their derivative, signed like an energy's second one. ``held`` (n, 2): the places that hold the
+    points, in the coordinates of their facets now; ``lost`` (n,) [N mm]: the work; ``far`` (n,): the distance slid beyond a facet.
     """
 
     dofs: Ints
@@ -36,8 +36,8 @@ class Rubbed:
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """The change of the place of n points on their facets: its derivative ``A`` (n, 2, 12) by the twelve, second derivatives ``Q``
-    (n, 2, 12, 12), and the ``metric`` (n, 2, 2) with its derivative ``turn`` (n, 2, 2, 12).
+    """The coordinates of n points on their facets: their first derivatives ``A`` (n, 2, 12) with respect to the twelve quantities
+    of ``Rubbed`` and second ones ``Q`` (n, 2, 12, 12), and the ``metric`` (n, 2, 2) with its derivative ``turn`` (n, 2, 2, 12).
     """
 
     A: Floats
@@ -47,10 +47,10 @@ class Sliding:
 
 
 def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Sliding:
-    """The derivatives of the coordinates of the place nearest to a point at ``gap`` (n,) [mm], by ``y' (x - y) = 0``.
+    """The derivatives of the coordinates of the place nearest to a point at a ``gap`` (n,) [mm], from ``y' (x - y) = 0``.
 
     With the slopes y' of the facet, ``R = x - y = g n`` and ``m = a - g b`` the first is ``m^-1 (y' (dx - dy) + R dy')``, and the
-    second m^-1 times that of the condition along it. ``second`` (n, 2, 2, 3), ``third`` (n, 2, 2, 2, 3): of the position [mm].
+    second is m^-1 times that of the condition along the first. ``second`` and ``third``: of the position [mm].
     """
     count, y, R = len(gap), there.tangents, gap[:, None] * there.normal
     inverse = np.linalg.inv(there.metric - gap[:, None, None] * there.bend)
@@ -75,7 +75,7 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Slid
         curved = np.einsum("ncdi,ni->ncd", third[:, b], R) - products[:, b] - np.swapaxes(products[:, b], 1, 2)
         curved -= np.einsum("ncdi,ni->ncd", second, y[:, b])
         S[:, b] += np.einsum("ncr,ncd,nds->nrs", A, curved, A)
-    slopes = np.einsum("nbci,ncr->nbir", second, A)  # of y', in all
+    slopes = np.einsum("nbci,ncr->nbir", second, A)  # the total derivatives of y'
     for b in (0, 1):
         slopes[:, b, :, 3 + 3 * b : 6 + 3 * b] += np.eye(3)
     turn = np.einsum("nai,nbir->nabr", y, slopes)
@@ -84,8 +84,8 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Slid
 
 class Rubbing:
     """Friction of the points of one pass by its law. ``facets`` (n,) and ``at`` (n, 2): the places on the other side that hold the
-    points, facet -1 where none does; ``settled`` (u,): the unknowns since when slip is counted. It ``acts`` once nothing is left
-    of an overlap at rest.
+    points, with facet -1 where none does; ``settled`` (u,): the unknowns from which slip is counted. Friction ``acts`` once no
+    overlap at rest is left.
     """
 
     acts = False
@@ -95,7 +95,7 @@ class Rubbing:
         self.facets, self.at, self.settled = np.full(len(one.areas), -1), np.zeros((len(one.areas), 2)), np.zeros(count)
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
-        """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) there, and no others."""
+        """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) on these, and no other points."""
         self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
@@ -135,8 +135,8 @@ class Rubbing:
         )
 
     def _slipped(self, met: Met, unknowns: Floats, tables: Floats) -> tuple[Sliding, Floats, Floats, Floats]:
-        """The change of the places; their whole way (n, 2) on the facets since the settled state, the part ``elastic`` (n, 2) that
-        counts as slip, and its derivative (n, 2, 12). The ``tables`` are those of the facets' functions.
+        """The derivatives of the places on the facets; their whole displacement (n, 2) since the settled state, the part (n, 2) of
+        it that counts as elastic slip, and its derivative (n, 2, 12). ``tables``: those of the facets' functions.
         """
         every = np.einsum("dnk,nki->dni", tables, self.other.nodes(unknowns)[met.facets])
         place = slip(
@@ -148,8 +148,8 @@ class Rubbing:
         return place, whole, share[:, None] * whole, change
 
     def _starts(self, met: Met) -> tuple[Floats, Floats, Floats]:
-        """The coordinates (n, 2) on the facets from which the points slip, the share (n,) of that way that counts as slip, and its
-        derivative (n,) by the gap. A point that came into contact slips from where its path enters the smoothing.
+        """The coordinates (n, 2) on the facets from which the points slip, the share (n,) of the path from there that counts as
+        slip, and its derivative (n,) in the gap. A point new in contact slips from where its path comes within the smoothing.
         """
         at, share, by_gap = self.at[met.points], np.ones(len(met.gap)), np.zeros(len(met.gap))
         moved = np.flatnonzero(self.facets[met.points] != met.facets)
@@ -166,7 +166,7 @@ class Rubbing:
         return at, share, by_gap
 
     def _rows(self, met: Met, tables: Floats) -> tuple[Ints, Floats]:
-        """The unknowns (n, a) of the points and places, and the rows (n, 12, a) by them."""
+        """The unknowns (n, a) of the points and places, and the ``rows`` (n, 12, a) of ``Rubbed``."""
         own, others = met.here.basis, tables[[0, 1, 2, 3, 4, 5]].transpose(1, 0, 2)
         none, count = np.zeros((len(own), 6, own.shape[1])), len(own)
         by = np.concatenate([none, others], axis=2)

@@ -21,12 +21,12 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves problems on ``ranks`` in a subprocess of its own, which is restarted after it died; jobs and frames are passed in a
-    ``folder``.
+    """Solves problems on ``ranks`` in a subprocess of its own, which is restarted if it has died; jobs and frames are passed as
+    files in a ``folder``.
     """
 
     def __init__(self, folder: Path, ranks: int) -> None:
-        self.folder, self.ranks = folder.resolve(), ranks  # the process may have been started elsewhere
+        self.folder, self.ranks = folder.resolve(), ranks  # the process may have another working directory
         self.process: Process | None = None
         self.closed = False
 
@@ -40,14 +40,14 @@ class Session:
         """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
         check(body, settings.element, settings.quadrature_degree)
         if body.touching and self.ranks > 1:
-            raise InputError("ranks", self.ranks, "1, on which parts of the surface may touch")
+            raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
         if body.touching and settings.linear_solver == "multigrid":
             raise InputError("linear_solver", '"multigrid"', "another: its levels do not support touching parts")
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
-        """Solve the ``job`` and sink each frame. A process that dies is the status *crashed*, and one over the time limit is ended
-        and *timed out* or *stalled*, not an exception. RuntimeError once the session is closed.
+        """Solve the ``job`` and pass each frame to ``sink``. No exception is raised where the process dies, which is the status
+        *crashed*, or is ended at the time limit, which is *timed out* or *stalled*. RuntimeError once the session is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
@@ -86,8 +86,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """A context in which all solutions on one rank run in one process, which reuses what it has loaded and compiled; an already
-    shared process remains in use. Without FEniCSx nothing is solved and nothing shared.
+    """A context in which all solutions on one rank run in one process, which reuses what it has loaded and compiled; a process that
+    is already shared remains in use. Without FEniCSx nothing is shared.
     """
     with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)
@@ -119,7 +119,7 @@ def solve_body(body: Body, settings: BodySettings) -> Run:
 
 
 def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
-    """Sink a scalar field, by the shared session or by a new one; not-a-number where the process died."""
+    """Solve for a scalar field and pass it to ``sink``, by the shared session or by a new one; NaN where the process died."""
     frames: list[Frame] = []
     with opened() as solver:
         outcome = solver.run(problem, settings.time_limit, frames.append)

@@ -13,23 +13,21 @@ from fem_reference.solvers.common.protocol import Trade
 class BodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an
-    easy step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts.
-    ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of the volume equation.
-    ``quadrature_degree``: of the polynomials integrated exactly on a straight cell, by default as required by the element.
-    ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation for each system, solved exactly; ``"lagged"``, inexact
-    FGMRES with a factorisation that is kept until a new one is cheaper, and exact solutions before a run ends ``out of steps``;
-    the default depends on the size. ``precision``: of factorisations, by default double for direct and single for lagged ones.
-    Both change the time but not the result.
-    ``follow``: ``"equilibrium"``, the one that Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an easy
+    step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's iteration ends when the norm of the nodal forces and of
+    the volume equation is at most this. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
+    straight cell, by default as the element requires. ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation and
+    an exact solution for each system; ``"lagged"``, inexact FGMRES preconditioned with a factorisation that is kept until a new one
+    is cheaper, and exact solutions before a run ends ``out of steps``; the default depends on the size. ``precision``: that of
+    factorisations, by default double for direct and single for lagged ones. Both settings change the time but not the result.
+    ``follow``: ``"equilibrium"``, whichever one Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium
     (only where negative modes are counted) the body is moved along its lowest mode by a ``perturbation``, a share of its size, and
-    solved again; up to eight times that, in both directions, until there are fewer negative modes.
-    ``reuse``: use the state of an earlier frame with the same load again.
-    ``time_limit``: the limit of processor time of a rank, by default none; after twenty times that by the clock the status is
-    *stalled*, which allows no conclusion. ``store_state``: each frame also stores the unknowns of every cell, from which
-    ``results`` evaluates stress, pressure, det F and fibre stretch; by default only for a muscle, if those of all frames take at
-    most 64 MB.
+    solved again; the perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes. ``reuse``: use
+    the state of an earlier frame with the same load again. ``time_limit``: the limit of processor time of a rank, by default none;
+    after twenty times that by the clock the status is *stalled*, which allows no conclusion. ``store_state``: each frame also
+    stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and fibre stretch; by default only
+    for a muscle, if those of all frames take at most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"

@@ -1,4 +1,4 @@
-"""Time spent: seconds by phase, and counts."""
+"""Records of the time spent: seconds by phase, and counts."""
 
 import time
 from collections import defaultdict
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class Spent:
-    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts only once, as its own."""
+    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts as the inner one only."""
 
     def __init__(self) -> None:
         self.seconds: defaultdict[str, float] = defaultdict(float)

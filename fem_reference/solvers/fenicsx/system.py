@@ -23,12 +23,12 @@ from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching import TouchingForces
 
-_ROUNDING = 1e-11  # [mm] of positions
+_ROUNDING = 1e-11  # [mm], the rounding of positions
 
 
 class System:
-    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed ones are eliminated: their residual is 0, their row
-    and column of the tangent a 1 on the diagonal.
+    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed ones are eliminated: their residual is 0, and their row
+    and column of the tangent have only a 1 on the diagonal.
     """
 
     def __init__(self, form: Form, conditions: list[PrescribedRegion | PointSprings], spent: Spent) -> None:
@@ -40,7 +40,7 @@ class System:
         for one in conditions:
             self.fixed[one.exact] = True
         self.cells = CellSums(form)
-        self.scale = np.ones(self.size)  # of the unknowns of linear systems
+        self.scale = np.ones(self.size)  # the unit of each unknown in linear systems
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
         self.ties = [one for one in conditions if isinstance(one, PointSprings)]
         springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
@@ -66,16 +66,16 @@ class System:
         self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
         diagonal = np.flatnonzero(structure.columns == rows)
         own = np.flatnonzero(self.fixed[: self.owned])
-        self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
+        self.prescribed_diagonal = diagonal[own]  # every row has one, in the order of the rows
         for terms in self.surface:
             terms.find_places(self._keys())
 
     def _keys(self) -> Ints:
-        """The sorted rows times the size plus columns (e,) of the structure."""
+        """The keys (e,) of the entries of the structure, ``row * size + column``, which are sorted."""
         return np.repeat(np.arange(self.size), np.diff(self.structure.starts)) * self.size + self.structure.columns
 
     def _add_touching(self, touching: TouchingForces) -> None:
-        """Add the tangent of ``touching`` to the entries, after those that it lacks were added to the structure."""
+        """Add the tangent of ``touching`` to the entries, after adding to the structure the entries that it lacks."""
         found, own = touching.tangent().tocoo(), self._keys()
         free = ~(self.fixed[found.row] | self.fixed[found.col])
         keys = found.row[free].astype(np.int64) * self.size + found.col[free]
@@ -91,7 +91,7 @@ class System:
         self.tangent.entries[places] += found.data[free]
 
     def residual(self, tractions: Tractions | None = None) -> float:
-        """Sum the residual into ``b`` and return its norm; contact ``tractions`` other than the present ones may be given."""
+        """Sum the residual into ``b`` and return its norm; ``tractions`` of contact, if given, replace the present ones."""
         with self.spent.on("assembly"):
             self.work.array[:] = 0
             self.cells.add(self.work.array)
@@ -118,7 +118,7 @@ class System:
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """Add all terms besides cells, and the parts of other ranks; the norm of the residual."""
+        """Add all terms but those of cells, and the parts of other ranks; return the norm of the residual."""
         for terms in self.surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -134,8 +134,8 @@ class System:
         return norm
 
     def balance_units(self) -> None:
-        """Choose a unit of pressure that gives volumes [mm3] and forces [N] equal weight in linear systems, from the present
-        tangent, so that pressures weigh as displacements [mm] do.
+        """Choose from the present tangent a unit of pressure with which volumes [mm3] and forces [N] have equal weight in linear
+        systems, and so have pressures and displacements [mm].
         """
         space = self.unknowns.function_space
         if space.num_sub_spaces == 1:
@@ -166,8 +166,8 @@ class System:
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self, *, inside: bool = False) -> Floats:
-        """The residual (n,) without springs over facets and prescribed values, on the ranks that own the unknowns; or that of the
-        effects ``inside`` alone.
+        """The residual (n,), without springs over facets and prescribed values, on the ranks that own the unknowns; or, if
+        ``inside``, the residual of the effects inside the body alone.
         """
         self.work.array[:] = 0
         self.cells.add(self.work.array)
@@ -190,7 +190,7 @@ class SurfaceSums:
         self.fixed = fixed
 
     def find_places(self, keys: Ints) -> None:
-        """Find the places of the tangent among entries with the sorted ``keys`` (e,), each row times the size plus column."""
+        """Find the places of the tangent among entries with the sorted ``keys`` (e,), each ``row * size + column``."""
         rows, columns = np.repeat(np.arange(len(self.fixed)), np.diff(self.matrix.indptr)), self.matrix.indices
         self.places = np.searchsorted(keys, rows * len(self.fixed) + columns)
         self.places[self.fixed[rows] | self.fixed[columns]] = len(keys)
@@ -214,7 +214,7 @@ def reactions(
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """The force (3,) [N] of each constraint in a ``system`` and of each bone in ``contact``, by name, on the body, and its moment
     (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
-    balance, or counts in each.
+    balance, or else counts in each.
     """
     residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
     shared = np.zeros(len(now), np.int64)

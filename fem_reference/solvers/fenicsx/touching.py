@@ -1,7 +1,7 @@
 """Contact between parts of the surface of a body: forces on the nodes of both sides, and their tangent.
 
-Points of quadrature on either side meet the nearest place on the facets of the other, as these are now, with half their area: so
-both sides are alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
+Quadrature points on either side, each with half its area, meet the nearest place on the present facets of the other side: so the
+two sides are treated alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
 """
 
 from collections.abc import Callable
@@ -21,15 +21,15 @@ from fem_reference.solvers.fenicsx.rubbing import Rubbed, Rubbing
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
 
-# With friction no point slides farther than this beyond the facet on which it begins a load step, in reference coordinates.
+# With friction no point may slide farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
-# The unknowns (n,) of a search, what each pass met, its friction, and the shares of overlaps at rest that were subtracted.
+# The unknowns (n,) of a search, the contact and the friction that each pass met, and the subtracted shares of overlaps at rest.
 State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
 
 class TouchingForces:
-    """Contact between the parts of the surface that the ``touching`` of a body names, on one rank. It follows the present unknowns
-    by itself.
+    """Contact between the parts of the surface that the ``touching`` of a body names, on one rank. It updates itself where the
+    unknowns have changed.
     """
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
@@ -55,9 +55,9 @@ class TouchingForces:
         for law in body.touching:
             seen = max(depth for one, depth in depths if one is law)
             deep, most = max(seen, overlap(body, law)), law.smoothing + (max(seen, 0.0) if law.relaxed else 0.0)
-            if deep > most:  # what contact does not see is not removed either
+            if deep > most:  # contact would neither see nor remove it
                 raise ArithmeticError(
-                    f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm, at most {most:.3g} mm may'
+                    f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm, which may be {most:.3g} mm at most'
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
@@ -67,7 +67,7 @@ class TouchingForces:
         self.settle()
 
     def move_to(self, frame: float) -> None:
-        """Subtract what is left at ``frame`` of overlaps at rest."""
+        """Subtract, from now on, the parts of overlaps at rest that are left at ``frame``."""
         for one in self.passes:
             if (share := one.law.allowance(frame)) != one.share:
                 one.share = share
@@ -78,7 +78,7 @@ class TouchingForces:
         return [one.share for one in self.passes]
 
     def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """The skin around the other part, by pass, that its points may not touch; None where there is none."""
+        """For each pass, the skin around the other part, which the points of the pass may not touch; None where there is none."""
         pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
         around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
         return [
@@ -132,25 +132,24 @@ class TouchingForces:
         self.look()
         found = dict[str, tuple[Floats, Floats]]()
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
-            if one.own is not None:  # of a part on itself: none in all
+            if one.own is not None:  # the forces of a part on itself sum to 0
                 continue
             forces = contact.forces[:, None] * met.there.normal  # on the points
             for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
-                if rubbed:  # with no moment about the points
+                if rubbed:  # friction has no moment about the points
                     drag = sign * rubbed.pull[:, :3]
                     turn = np.cross(met.here.point, drag).sum(axis=0)
                     found[name] = found[name][0] + drag.sum(axis=0), found[name][1] + turn
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, of several laws each its own pressure
-        too (``Touching.pressure_name``); the rest area under pressure,
-        ``touching_area`` [mm2], the mean of both sides; the number of points under pressure, ``touching_points``; the depth of the
-        deepest point at rest, ``touching_overlap_at_rest`` [mm], where it is removed; and with friction its dissipated work since
-        the start, ``touching_friction_work`` [N mm].
+        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, for several laws also the pressure of
+        each (``Touching.pressure_name``); the rest area under pressure, ``touching_area`` [mm2], the mean of both sides; the number
+        of points under pressure, ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm],
+        where it is removed; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
@@ -178,7 +177,7 @@ class TouchingForces:
                 one.settle(met, rubbed.held if rubbed else met.there.at, self.seen)
                 self.dissipated += float(rubbed.lost.sum()) if rubbed else 0.0
         if any(self.rubbing):
-            self.seen = np.full_like(self.seen, np.nan)  # what holds the points is another
+            self.seen = np.full_like(self.seen, np.nan)  # other places hold the points now
             self.look()
         for side, (met, _) in zip(self.passes, self.now, strict=True):
             side.let_fall(met)
@@ -186,21 +185,21 @@ class TouchingForces:
 
     @property
     def state(self) -> State:
-        """The contact at the unknowns of the last search, which determines the facets that points stay on in the next."""
+        """The contact at the unknowns of the last search, which determines the facets on which points stay in the next search."""
         return self.seen, self.now, self.rubbed, self.acting()
 
     def restoring(self) -> Callable[[], None]:
-        """A function that restores the present state, as the unknowns have been."""
+        """A function that restores the present state, once the unknowns have been restored."""
         return partial(self.go_back, self.state)
 
     def go_back(self, state: State | None = None) -> None:
-        """Restore an earlier ``state``, by default the settled one, as the unknowns have been."""
+        """Restore an earlier ``state``, by default the settled one, once the unknowns have been restored."""
         self.seen, self.now, self.rubbed, shares = state or self.settled
-        if shares != self.acting():  # its pressures are those of another frame
+        if shares != self.acting():  # the pressures are those of another frame
             self.seen = np.full_like(self.seen, np.nan)
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """Diverged where a point went through the other part since the unknowns ``before`` (n,), past its rim or too far."""
+        """The trouble *diverged* where a point since ``before`` (n,) went through the other part, past its rim or too far."""
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):

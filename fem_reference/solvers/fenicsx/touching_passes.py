@@ -1,4 +1,4 @@
-"""One side of the surface of a body in contact with another: its points that meet facets, their pressure, and points that pass."""
+"""One side of a body's surface in contact with another: points that meet facets, their pressure, and points that pass through."""
 
 from dataclasses import dataclass
 
@@ -12,26 +12,27 @@ from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 from fem_reference.solvers.fenicsx.own_pairs import OwnPairs
 
-# Of the quadrature on facets: with 5 instead of 8 the pressure between two blocks with unrelated meshes is off by 5 instead of 2 %.
+# The degree of quadrature on facets: with 5 instead of 8, the pressure between two blocks with unrelated meshes is off by 5 instead
+# of 2 %.
 _DEGREE = 8
-# A place is on a facet up to this distance beyond its edges, in reference coordinates: on a convex surface no facet is nearest to
-# points between the normals of two at their edge.
+# A place is on a facet up to this distance beyond its edges, in reference coordinates: on a convex surface, points between the
+# normals of two facets at their common edge are nearest to neither.
 _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges: where two facets meet at an angle, Newton's method would go
 # back and forth between them.
 _STAYS = 0.05
-# Beyond a sharp edge a part faces another way: a point that slides off it there is free.
+# The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
-# Of a part with itself, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
+# In self-contact, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
 _DEEP = 0.125
 _AT_ONCE = 100000  # pairs whose paths are followed together
-_BULGE = 1.25  # a facet is as far from a plane as its farthest node times this, at most
+_BULGE = 1.25  # a facet bulges from a plane at most this times as far as its farthest node
 
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """The n ``points`` of one side that are near the other: the places ``here`` on their own facets ``own`` (n,), the places
-    ``there`` on the ``facets`` (n,) they meet, and the ``gap`` (n,) [mm] along the normal there, negative inside.
+    """The n ``points`` of one side that are near the other: their places ``here`` on their own facets ``own`` (n,), the places
+    ``there`` on the ``facets`` (n,) that they meet, and the ``gap`` (n,) [mm] along the normal there, negative inside.
     """
 
     points: Ints
@@ -42,16 +43,16 @@ class Met:
     gap: Floats
 
     def some(self, which: Ints) -> "Met":
-        """Those with the numbers ``which`` (k,)."""
+        """The points with the numbers ``which`` (k,) among these."""
         here, there = self.here[which], self.there[which]
         return Met(self.points[which], self.own[which], here, self.facets[which], there, self.gap[which])
 
 
 @dataclass(frozen=True, eq=False)
 class PressedPoints:
-    """Contact of n points: the unknowns ``dofs`` (n, a) of the nodes that carry them and the places they meet; by these, the first
-    derivatives ``rows`` (n, 5, a) of the gap, of the position along two tangents, and of the slopes of the facet along them; the
-    ``forces`` (n,) [N], and the second derivatives ``second`` (n, 5, 5) of the energy by the five.
+    """Contact of n points: the unknowns ``dofs`` (n, a) of the nodes that carry them and the places they meet; in these, the first
+    derivatives ``rows`` (n, 5, a) of five: the gap, the position along two tangents and the facet's slopes along the normal; the
+    ``forces`` (n,) [N], and the second derivatives ``second`` (n, 5, 5) of the energy in the five.
     """
 
     dofs: Ints
@@ -60,13 +61,13 @@ class PressedPoints:
     second: Floats
 
 
-# The unknowns (n,) of a settled state, and what was met in it, if anything.
+# The unknowns (n,) of a settled state, and the points that met facets in it, if known.
 Settled = tuple[Floats, Met | None]
 
 
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: those of the force on the side and of the one on the other.
+    ``names``: the name of the force on the side, and that of the force on the other.
     """
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
@@ -76,17 +77,14 @@ class Pass:
         rest = self._here(side.rest, np.arange(count * self.each))
         self.areas = np.sqrt(np.linalg.det(rest.metric)) * np.tile(weights, count) / 2
         self.basis = side.element.tabulate(0, self.at)[0, :, :, 0]
-        corners = Delaunay(other.element.points).simplices  # of flat pieces of a facet
+        corners = Delaunay(other.element.points).simplices  # the corners of flat pieces of a facet
         turned = np.linalg.det(other.element.points[corners[:, 1:]] - other.element.points[corners[:, :1]]) < 0
         corners[turned] = corners[turned][:, ::-1]
-        self.overlaps, self.share = (
-            np.zeros(len(self.areas)),
-            0.0,
-        )  # at rest, and the share of them that is subtracted now
+        self.overlaps, self.share = np.zeros(len(self.areas)), 0.0  # at rest, and the share subtracted now
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
         self.own = OwnPairs(side) if side is other else None
-        # Below half the thickness of a part its other side is nearer. Parts of one that overlap at rest are not that.
+        # Deeper than half the thickness of a part, its other side is nearer. Self-penetration at rest does not count as thinness.
         inset = law.smoothing if self.own else 0.0
         triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
         starts = middle.point - inset * middle.normal
@@ -102,9 +100,9 @@ class Pass:
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, settled: Settled | None = None) -> Met:
         """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
-        reaches as deep as its radius, and as half the thickness of its part. Of a part with itself only those that were in front of
-        their facet in the ``settled`` state, by default the present one, or in contact with it or the next: what is behind a facet
-        is the body itself.
+        reaches as deep as its radius and half the thickness of its part. In self-contact, only points that in the ``settled``
+        state, by default the present one, were in front of their facet, or in contact with it or its neighbour: behind a facet is
+        the body itself.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
@@ -120,7 +118,7 @@ class Pass:
         felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & (beyond <= _BEYOND))
         here = self._here(self.side.nodes(unknowns), some[felt])
         facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
-        # A point just beyond the edge of a wall that it sees from inside is outside: another facet is in front of it, out of reach.
+        # A point just beyond the edge of a facet that it sees from inside is outside: the facet before it is out of reach.
         edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING)
         faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
@@ -129,7 +127,7 @@ class Pass:
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
     def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
-        """Those pairs of points and facets of a part with itself where the point was in front of the facet, or in contact there."""
+        """The pairs, in self-contact, of points and facets where the point was in front of the facet or in contact there."""
         if self.own is None:
             return some, facets
         unknowns, then = settled
@@ -148,8 +146,8 @@ class Pass:
     def _near(
         self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, more: Floats, *states: Floats
     ) -> tuple[Ints, Ints]:
-        """Pairs of ``points`` (n, 3) and of facets whose middles are within ``reach`` (m,) [mm] and what a point reaches ``more``
-        (n,); of a part with itself only those that may touch each other (``OwnPairs.near``), in whose balls points stay.
+        """Pairs of ``points`` (n, 3) and of facets whose middles are within the facet's ``reach`` (m,) [mm] plus what a point
+        reaches ``more`` (n,); in self-contact only those whose facets may touch (``OwnPairs.near``), the points being in one.
         """
         if self.own is None:
             return pairs(points, balls[0], reach + more.max())
@@ -159,16 +157,16 @@ class Pass:
         return some[close], facets[close]
 
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
-        """Pairs of points and facets, among those given, that may be at gaps up to ``most`` [mm] and less deep than the radius, by
-        the plane through the middle of the facet and the heights of its nodes above that.
+        """Pairs, among the given ones, of points and facets whose gap may be at most ``most`` [mm] and whose depth may be below the
+        radius, judged by the plane through the middle of the facet and the heights of its nodes above that.
         """
         height, bulge = self._heights(nodes, points, some, facets)
         kept = (height < most + bulge[facets]) & (height > -(self._reach(nodes) + bulge)[facets])
         return some[kept], facets[kept]
 
     def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
-        """The heights (n,) [mm] of points over the planes through the middles of facets, and of each facet (m,) the most that it
-        may bulge from its own.
+        """The heights (n,) [mm] of points over the planes through the middles of their facets, and the most that each facet (m,)
+        may bulge from its plane.
         """
         middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
@@ -182,8 +180,8 @@ class Pass:
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
     def let_fall(self, met: Met) -> None:
-        """Subtract no more than what leaves the points that ``met`` the other side without pressure, nothing of others; of a part
-        with itself, whose shift at rest is not removed: points that have come apart press as others do when they meet again.
+        """In self-contact whose overlap at rest stays, reduce what is subtracted until the points that ``met`` the other side just
+        have no pressure, and to 0 for others: once apart, points press as others do when they meet again.
         """
         if self.own and self.law.relaxed is None:
             left = np.zeros_like(self.overlaps)
@@ -215,10 +213,10 @@ class Pass:
         return PressedPoints(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
-        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), where others ``met`` it:
-        they are behind the facet that they were near, or passed one on their path, and are not in contact. Paths that begin inside,
-        or so near that flat pieces of a facet may be in front, are followed from in front too: raised by at most what the facet
-        reaches, as less deep points are met. What ends in front of a facet has passed flat pieces of it alone.
+        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without those that ``met``
+        it: they are behind the facet that they were near, or passed one on their path. Paths that begin inside, or so near that
+        flat pieces of a facet may be in front, are also followed from in front, raised by at most the reach of the facet, above
+        which points are met. Points that end in front of a facet passed only its flat pieces.
         """
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
@@ -240,13 +238,13 @@ class Pass:
         return np.union1d(behind, points[~front])
 
     def _reach(self, nodes: Floats) -> Floats:
-        """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are felt: their radius, half the thickness of the part."""
+        """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are met: their radius or half the thickness."""
         return np.minimum(self.other.balls(nodes)[1], self.deepest)
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
-        """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) and feel nothing:
-        those that were ``pressed`` before on a part beside it, and any at depth. Those that ``met`` a part feel it; a point above
-        the part may be behind a wall of it, but is beyond the wall's edge.
+        """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) without contact:
+        those that were ``pressed`` before on the part beside it, and any that are deep. Points that ``met`` a part are in contact;
+        a point above the part may be behind a wall of it, but is then beyond the wall's edge.
         """
         near = self.met(now, self.law.smoothing)
         facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
@@ -256,7 +254,7 @@ class Pass:
 
     def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], old: Floats, new: Floats) -> Ints:
         """The ``free`` points (n,) that pass flat pieces of facets on their path, and these facets: (2, p)."""
-        shift = (new - old).mean(axis=(0, 1))  # what all do together changes nothing
+        shift = (new - old).mean(axis=(0, 1))  # a common displacement changes nothing
         ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
         far = np.linalg.norm(ends - starts, axis=1) / 2

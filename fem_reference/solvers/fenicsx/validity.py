@@ -1,8 +1,8 @@
 """Checks of a state by means over cells: laws are within their ranges, and the body has not collapsed.
 
-Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far off in a cell
-that has kept its volume. Means of single cells may be off there too (0.37 and 1.9 in ``gluteus_maximus``, with a bulk modulus of
-a thousand shear moduli). There a law outside its range is named, but a body has collapsed only where more of it is lost.
+Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far from 1 in a
+cell that has kept its volume. Even means of single cells may be far from 1 (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
+modulus of a thousand shear moduli). There a law is reported as outside its range, but the body has not collapsed.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,10 +23,10 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less of its rest volume has collapsed, whatever the laws state: about four fifths of muscle are water,
-# which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal
-# muscle); less than a fifth would not hold even the rest. A body has collapsed where such cells are more than this
-# share of it at rest: those at a rim are fewer the smaller they are.
+# A cell with less than this share of its rest volume has collapsed, whatever the laws' ranges: about four fifths of muscle are
+# water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
+# and a fifth of the volume would barely hold the rest. A body has collapsed where such cells are more than this share of it at
+# rest: at a rim they take the less, the smaller the cells are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
@@ -46,7 +46,7 @@ class Outside:
 
 
 class Ranges:
-    """The laws that were outside their ranges over the states of a run: by law, the frames and what was outside."""
+    """The laws that were outside their ranges over the states of a run: for each law, the frames and the value that was outside."""
 
     def __init__(self) -> None:
         self.found: dict[str, dict[float, str]] = {}
@@ -57,11 +57,11 @@ class Ranges:
             self.found.setdefault(one.law, {}).setdefault(frame, str(one))
 
     def facts(self) -> list[Any]:
-        """The facts, in JSON's types."""
+        """The content, in the types of JSON."""
         return [[law, list(states.items())] for law, states in self.found.items()]
 
     def know(self, facts: list[Any]) -> None:
-        """Restore the laws that gave ``facts``."""
+        """Restore the content from ``facts``."""
         self.found = {law: dict(states) for law, states in facts}
 
     def __str__(self) -> str:
@@ -74,13 +74,13 @@ class Ranges:
 
 
 class Validity:
-    """The means over a body's cells of the measures that its laws limit. Its methods are collective."""
+    """The means, over each cell of a body, of the measures that its laws limit. Its methods are collective."""
 
     def __init__(self, determinants: Determinants, form: Form, body: Body) -> None:
         self.mesh, self.cells, self.effects = determinants.mesh, determinants.cells, body.effects
         self.values: dict[str, Callable[[], Floats]] = {"V/V0": determinants.values_now}
         if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
-            # Compiled here and by all ranks together: one without cells evaluates none of it.
+            # It is compiled here, by all ranks together, even those that have no cells.
             stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
@@ -93,7 +93,7 @@ class Validity:
         return float(present / rest)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """Collapsed where more than a negligible part of the body has lost too much volume."""
+        """The trouble *collapsed* where more than a negligible part of the body has lost too much volume."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
@@ -131,7 +131,7 @@ class Validity:
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
 
     def _extreme(self, means: Floats, sign: float = 1.0) -> Extreme:
-        """The least of ``sign means`` (n,) over all ranks."""
+        """The mean with the least ``sign * means`` (n,) over all ranks."""
         return least(self.mesh.comm, means, self.cells, self.centres, sign=sign)
 
 

@@ -12,7 +12,7 @@ from fem_reference.foundations.subprocesses import end_with_starter, forget_peak
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
+from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - has to be first
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
@@ -44,13 +44,13 @@ class Worker:
             self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
         self.solving = self.solving_processor = self.checking = 0.0
-        self.reported = 0.0  # solving_processor, up to the last reported frame
+        self.reported = 0.0  # ``solving_processor`` up to the last reported frame
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
-        self.unstable: dict[float, tuple[float, float]] = {}  # by frame, negative modes, and those of the material
+        self.unstable: dict[float, tuple[float, float]] = {}  # by frame: the negative modes, and those of the material
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
-        self.exact = False  # linear systems are solved exactly after Newton's method failed otherwise
-        self.collapse = ""  # the result of attempts since the last good state, where a body collapsed in one
+        self.exact = False  # True once linear systems are solved exactly, after Newton's method has failed
+        self.collapse = ""  # the message of an attempt since the last good state in which the body collapsed
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
@@ -73,7 +73,7 @@ class Worker:
         return frames, StepSizes(first, settings.smallest_step, settings.largest_step, self.job.body.stops)
 
     def run(self) -> Outcome:
-        """March through the frames; the end of the run."""
+        """March through the frames and return the outcome of the run."""
         frames, steps = self.begin()
         for reached in march(self.attempt, frames, steps, self.body.recall, self.solve_exactly):
             self.counts["newton_iterations"] += reached.iterations
@@ -91,7 +91,7 @@ class Worker:
         return Outcome("converged", message, self.cost())
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the last state; restore that on failure."""
+        """Solve at ``frame`` from the last state, which is restored on failure."""
         begin, processor = time.perf_counter(), time.process_time()
         result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
@@ -138,7 +138,7 @@ class Worker:
         )
 
     def failure(self, reached: Step) -> tuple[Status, str]:
-        """The status of a run that did not reach a frame; and the reason, the place and a remedy in words."""
+        """The status of a run that did not reach a frame, and a sentence with the reason, the place and a remedy."""
         body, contact = self.body, self.body.contact
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, body.validity.examine(reached.at)[1])
@@ -187,8 +187,8 @@ class Worker:
         self.report(found)
 
     def cost(self) -> dict[str, float]:
-        """Seconds by phase on the first rank, counts, and processor time and memory over all ranks; with the cost of earlier
-        processes up to the frame from which this one continued.
+        """Seconds by phase on the first rank, counts, and processor time and memory over all ranks; they include the cost of
+        earlier processes up to the frame from which this one continued.
         """
         body, spent = self.body, self.body.spent
         memory = body.comm.allreduce(peak_memory())
@@ -226,7 +226,7 @@ def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
 
 
 def report(folder: Path, found: Frame | Outcome) -> None:
-    """Write what the first rank ``found`` into a file in the ``folder`` and name it to the process that started this one."""
+    """Write what the first rank ``found`` into a file in the ``folder`` and tell its name to the process that started this one."""
     if MPI.COMM_WORLD.rank == 0:
         file = folder / f"report_{next(_numbers)}.pickle"
         file.write_bytes(pickle.dumps(found))
@@ -238,7 +238,7 @@ def main() -> None:
     """Solve the jobs whose files standard input names, one after the other."""
     end_with_starter()
     compiling.prepare()
-    gc.freeze()  # imported objects stay, and collections after each job skip them
+    gc.freeze()  # collections after each job then skip imported objects, which stay
     comm = MPI.COMM_WORLD
     while line := comm.bcast(sys.stdin.readline() if comm.rank == 0 else ""):
         path = Path(line.rstrip("\n"))

@@ -1,6 +1,6 @@
 """The independent second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
 
-``field`` solves scalar fields, ``body`` bodies, whose stress and stiffness are derivatives of energies by ``jets``.
+``field`` solves for scalar fields and ``body`` for bodies, whose stress and stiffness follow from energies by ``jets``.
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
@@ -14,5 +14,5 @@ SOLVES = (
     FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
     BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )
-# Their runs in memory.
+# The functions that run both in memory.
 solve_field, solve_body = SOLVES[0].run, SOLVES[1].run

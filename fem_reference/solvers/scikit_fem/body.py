@@ -24,18 +24,18 @@ from fem_reference.solvers.scikit_fem.equations import Equations
 log = logging.getLogger(__name__)
 
 _HALVINGS = 10
-_ROUNDING = 1e-14  # of what is prescribed, over the size of the body
-_GROWTH = 10.0  # of the residual, above which a Newton step is halved
+_ROUNDING = 1e-14  # of prescribed displacements, as a share of the body's size
+_GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
 
 
 class ScikitBodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each frame:
-    it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of
-    the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default as
-    required by the element.
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one step to each
+    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's iteration ends when the norm of the nodal forces and of
+    the volume equation is at most this. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
+    straight cell, by default as the element requires.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -118,9 +118,9 @@ class March:
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state, which stays where it fails. A state in which det F is not positive, at a
-        quadrature point or a vertex, is inverted whatever Newton's method says.
+        quadrature point or a vertex, is *inverted* even if Newton's method converged.
         """
-        with np.errstate(all="ignore"):  # what is not finite is a failed step
+        with np.errstate(all="ignore"):  # a step with numbers that are not finite has failed
             attempt, unknowns = self._newton(frame)
             if attempt.converged and (trouble := self._trouble(unknowns, frame)) is not None:
                 attempt = attempt.refused(trouble)
@@ -159,7 +159,7 @@ class March:
                 return ended(f"Newton's method did not converge in {allowed} iterations")
             try:
                 step = now.step(free, fixed, gap)
-            except RuntimeError:  # what SuperLU raises where a pivot is zero
+            except RuntimeError:  # SuperLU raises it where a pivot is zero
                 return ended("the equations have no unique solution")
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * residuals[-1], frame)
             if then is None:
@@ -210,7 +210,7 @@ class March:
         )
 
     def _force(self, entry: Prescribed, places: Floats, residual: Floats) -> tuple[Floats, Floats]:
-        """The force (3,) [N] on the nodes of ``entry`` along its components, and its moment (3,) [N mm] about the origin."""
+        """The force (3,) [N] on the nodes of ``entry``, along its components, and its moment (3,) [N mm] about the origin."""
         nodes, components = self.nodes[entry.name], list(entry.components)
         forces = np.zeros((len(nodes), 3))
         forces[:, components] = residual[: places.size].reshape(-1, 3)[nodes][:, components]

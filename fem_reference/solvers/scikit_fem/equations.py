@@ -1,4 +1,4 @@
-"""The equations of a body: residual and tangent, summed from what acts, each differentiated by jets."""
+"""The equations of a body: residual and tangent, summed from energies, loads and springs, each differentiated by jets."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
-# By the displacement of an element: exact on a straight cell with a law of second degree in the strain.
+# The degree by the element's displacement: exact on a straight cell for an energy of second degree in the strain.
 QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 Acting = list[tuple[Effect, float]]
-# Of some points, their variables (n,) and a frame: the rates (p, n) of the work with the variables, and theirs (p, n, n).
+# A function of p points, their n variables and a frame: the derivatives (p, n) of the work, and those of second order (p, n, n).
 Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
 
 
@@ -54,7 +54,7 @@ class Equations:
         self.stabilising = self._projection() if is_stabilised(element) else None
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
-        """The residual (N,) [N, mm3] and its tangent (N, N), with the pull of ``springs`` or without."""
+        """The residual (N,) [N, mm3] and its tangent (N, N), with the forces of springs if ``springs``."""
         residual = np.zeros(len(unknowns))
         blocks = []
         for part in self.parts + (self.springs if springs else []):
@@ -86,8 +86,8 @@ class Equations:
         return float((energy * self.inside.weights).sum() - stabilising)
 
     def _projection(self) -> Any:
-        """The matrix (N, N) of minus the energy of ``body.is_stabilised``: M - B^T D^-1 B, with the masses M of the pressure, D of
-        a constant in each cell and B between these, over twice the shear modulus.
+        """The matrix (N, N) of minus the energy of ``body.is_stabilised``: M - B^T D^-1 B, with the mass matrices M of the
+        pressure, D of a constant in each cell and B between the two, all divided by twice the shear modulus.
         """
         inside, entries = self.inside, self.inside.variables(np.zeros(self.space.size)).reshape(-1, VARIABLES)
         _, curvature = self._energy_law(inside, variables(entries.T), self.body.frames[0])
@@ -109,7 +109,7 @@ class Equations:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
 
     def _felt(self) -> list[int]:
-        """The variables that the energies depend on: those of the displacement are costly and seldom needed."""
+        """The variables on which the energies depend: the displacement itself is costly and seldom among them."""
         deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
         jets = variables(deformed[:, None])
         fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
@@ -127,7 +127,7 @@ class Equations:
         return energy.slope, energy.curvature
 
     def _at(self, points: Points, entries: list[Any], fibre: Floats | None) -> State:
-        """The state of ``points``, with the shares that they have in regions in the shape of their ``fibre`` or in one row."""
+        """The state of ``points``, with their shares in regions in the shape of the ``entries``, or in one row."""
         cells = np.repeat(points.cells, points.places.shape[1])
         shares = self.body.shares(points.places.reshape(-1, 3), cells)
         shape = np.shape(entries[0]) if isinstance(entries[0], np.ndarray) else (-1,)
@@ -149,7 +149,7 @@ def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tu
 
 
 def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
-    """The virtual work of a load: minus its traction, along the displacement."""
+    """The virtual work of a load: minus its traction times the virtual displacement."""
     assert points.normals is not None
     state = _state(jets, None, load.amount(frame))
     tractions = load.traction(state, list(points.normals.reshape(-1, 3).T))
@@ -157,7 +157,7 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
-    """The virtual work of springs that pull towards what is prescribed."""
+    """The virtual work of springs that pull towards the prescribed displacement."""
     wanted, pull = entry.path(points.places.reshape(-1, 3), frame), [constant(0.0, jets[0])] * 3
     for i in entry.components:
         pull[i] = entry.stiffness * (jets[9 + i] - wanted[:, i])
@@ -165,7 +165,7 @@ def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float
 
 
 def _along_displacement(forces: Sequence[Jet]) -> tuple[Floats, Floats]:
-    """Forces (3,) as rates of work with the variables of a surface."""
+    """Forces (3,) as derivatives of the work with respect to the variables on a surface."""
     along = np.broadcast_shapes(*(force.value.shape for force in forces))
     slope, curvature = np.zeros((VARIABLES, *along)), np.zeros((VARIABLES, VARIABLES, *along))
     for i, force in enumerate(forces):

@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-Each triangle in space is laid flat before it is assembled. That keeps all that the equations need of a surface (lengths and areas
-within it); gradients are turned back into space.
+Each triangle in space is laid flat before it is assembled. That preserves the lengths and areas within the surface, all that the
+equations need; gradients are rotated back into space.
 """
 
 import time
@@ -23,21 +23,21 @@ from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
-_SINGULAR = 1e15  # condition numbers above leave no correct digit
-# By corners of a cell, of orders 1 and 2.
+_SINGULAR = 1e15  # condition numbers above this leave no correct digit
+# By the number of corners of a cell: elements of orders 1 and 2.
 _ELEMENTS = {2: (skfem.ElementLineP1, skfem.ElementLineP2), 3: (skfem.ElementTriP1, skfem.ElementTriP2)}
 
 
 class ScikitFieldSettings(Record):
-    """``form``: that of the ``scene``, or always plain ``galerkin``, to show the effect of stabilisation."""
+    """``form``: the weak form that the ``scene`` names, or plain ``galerkin`` in any scene, to show the effect of stabilisation."""
 
     form: Literal["scene", "galerkin"] = "scene"
 
 
 @dataclass(frozen=True, eq=False)
 class Flat:
-    """A mesh in the form of scikit-fem: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
-    coordinates (t,) to the coordinates of the domain (d,).
+    """A mesh in the form of scikit-fem: ``mesh``, and for each cell the ``frames`` (m, d, t) and ``origins`` (m, d) that map its
+    flat coordinates (t,) to those of the domain (d,).
     """
 
     mesh: Any
@@ -66,7 +66,7 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right side (N,) of the weak form, without fixed values; nodes in the order of the problem."""
+    """Matrix (N, N) and right-hand side (N,) of the weak form, before values are fixed, with nodes in the order of the problem."""
     basis, laid = space(problem)
     slope_of = _slope_weights(basis)
     position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
@@ -115,7 +115,7 @@ def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
         inner = A[free][:, free].tocsc()
         try:
             factors = splu(inner)
-        except RuntimeError:  # what SuperLU raises where a pivot is zero
+        except RuntimeError:  # SuperLU raises it where a pivot is zero
             return _failed(len(b), "the equations have no unique solution")
         solve, transposed = factors.solve, partial(factors.solve, trans="T")
         inverse = LinearOperator(inner.shape, solve, transposed, solve, dtype=inner.dtype)
@@ -134,7 +134,7 @@ def _failed(count: int, why: str) -> tuple[Floats, Outcome]:
 def _slope_weights(basis: Any) -> Floats:
     """Weights (m, t, q) that give the derivative of a linear function from its values at the quadrature points of a cell.
 
-    The gradient of a quadratic function is linear, so that they give its Laplacian, which scikit-fem does not have.
+    The gradient of a quadratic function is linear, so the weights give its Laplacian, which scikit-fem does not offer.
     """
     at_points = np.asarray(basis.global_coordinates()).transpose(1, 0, 2)
     return np.asarray(np.linalg.pinv(at_points - at_points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))
@@ -155,7 +155,7 @@ def order_of(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """The flow over the boundary (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
+    """The flow (N,) through the boundary: the integral of k slope times each hat function, by Gauss's rule of 3 points."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]
@@ -169,7 +169,7 @@ def _fluxes(problem: FieldProblem) -> Floats:
         for s, weight in zip(*_GAUSS, strict=True):
             flow = weight * lengths * problem.diffusion * at(flux.slope, (1 - s) * ends[:, 0] + s * ends[:, 1])
             hats = (1 - s, s) if problem.order == 1 else ((1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s))
-            for nodes, hat in zip((*edges.T, middles), hats, strict=False):  # order 1 has no middles
+            for nodes, hat in zip((*edges.T, middles), hats, strict=False):  # elements of order 1 have no middles
                 np.add.at(b, nodes, hat * flow)
     return b
 

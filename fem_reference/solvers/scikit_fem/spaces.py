@@ -1,7 +1,7 @@
 """Elements of scikit-fem on the cells of a body, evaluated at points of its cells and facets.
 
-An effect may depend on 13 variables at a point: the entries of F row by row, the displacement and the pressure. Each is
-linear in the unknowns: the three components of the displacement node by node, then the pressure.
+An effect may depend on 13 variables at a point: the entries of F row by row, the displacement and the pressure. Each is linear in
+the unknowns of a cell: the three components of the displacement node by node, then the pressures.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ VARIABLES = 13
 DISPLACEMENT = slice(9, 12)
 PRESSURE = 12
 _REST = np.append(np.eye(3).ravel(), np.zeros(4))
-# By kind of cell, of degrees 1 and 2; of degrees 0 to 2.
+# By kind of cell: meshes of degrees 1 and 2, then elements of degrees 0 to 2.
 _MESHES = {"tetrahedron": (skfem.MeshTet1, skfem.MeshTet2), "hexahedron": (skfem.MeshHex1, skfem.MeshHex2)}
 _ELEMENTS = {
     "tetrahedron": (skfem.ElementTetP0, skfem.ElementTetP1, skfem.ElementTetP2),
@@ -31,10 +31,10 @@ _ELEMENTS = {
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of integration, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q)
-    [mm3 or mm2], the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement and ``pressures``
-    (m, q, l) of the pressure, the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3), and in a body
-    with fibres their directions ``fibre`` (m, q, 3).
+    """Points of integration, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q) [mm3 or mm2],
+    the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement, the values ``pressures`` (m, q, l)
+    of those of the pressure, and the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3), and in a
+    body with fibres their directions ``fibre`` (m, q, 3).
     """
 
     cells: Ints
@@ -53,7 +53,7 @@ class Points:
 
     @property
     def rates(self) -> Floats:
-        """The slopes of the variables at each point by the unknowns of its cell, (m, q, 13, 3 k + l)."""
+        """The derivatives (m, q, 13, 3 k + l) of the variables at each point with respect to the unknowns of its cell."""
         m, q, k = self.values.shape
         rates = np.zeros((m, q, VARIABLES, 3 * k + self.pressures.shape[2]))
         for i in range(3):
@@ -77,7 +77,7 @@ class Space:
     """The unknowns of an element of ``ELEMENTS`` on ``cells``."""
 
     def __init__(self, cells: Cells, element: str, degree: int) -> None:
-        """``degree`` of the polynomials that are integrated exactly on a straight cell."""
+        """``degree``: that of the polynomials that are integrated exactly on a straight cell."""
         kind, displacement, pressure = ELEMENTS[element]
         self.cells, self.degree = cells, degree
         self.nodal = _ELEMENTS[kind][displacement]()
@@ -88,7 +88,7 @@ class Space:
         rule = get_quadrature(self.nodal.refdom, degree)
         self.basis = skfem.Basis(self.mesh, self.nodal, quadrature=rule)
         self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm] of the nodes of the displacement
-        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # of the displacement, those of the mesh
+        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # of the displacement, by node of the mesh
         self.nodes[here] = self.basis.element_dofs[: here.shape[1]].T
         self.pressure = None
         if pressure is not None:
@@ -129,7 +129,7 @@ class Space:
         return self._points(skfem.FacetBasis, rule, facets=self.facets(region))
 
     def _points(self, kind: Any, rule: tuple[Floats, Floats], **where: Ints) -> Points:
-        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem; ``where``: its ``facets``, if it is on facets."""
+        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem; ``where`` has the ``facets`` if the basis is on facets."""
         own, *others = (
             kind(self.mesh, basis.elem, quadrature=rule, dofs=basis.dofs, disable_doflocs=True, **where)
             for basis in (self.basis, self.pressure)
