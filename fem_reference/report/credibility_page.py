@@ -18,10 +18,10 @@ from fem_reference.report.pages import Page
 COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case goes through
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract",
-    "indicative": "within what single specimens, quotations or memory say",
-    "outside": "the model differs from a measurement of muscle by more than the uncertainty of that",
-    "verified only": "the equations are solved right; no measurement of muscle is laid beside it",
-    "not measured": "the data of its experiment is not here",
+    "indicative": "agrees with single specimens, quotations or numbers from memory only",
+    "outside": "the model differs from a measurement of muscle by more than the uncertainty of the measurement",
+    "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
+    "not measured": "the data of its experiment is not installed",
 }
 
 
@@ -105,7 +105,7 @@ def source(experiment: str) -> str:
 
 
 def facts(found: Credibility) -> dict[str, Any]:
-    """All of it as valid JSON."""
+    """The contents of the page as valid JSON."""
     rows = [
         {
             "quantity": row.claim.name,
