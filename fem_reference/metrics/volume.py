@@ -7,7 +7,7 @@ from fem_reference.metrics import Measure, MeasurementContext, Shown, Statistic,
 from fem_reference.runs.store import Run
 
 _FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # places where the volume comes first
-# The volume is nearly constant, so its error falls with no clear order: it counts with the order of the worst place.
+# The volume is nearly constant, so its error tells little about the order: it counts with that of the worst place.
 STATISTICS = {
     "deviation": Statistic(
         "%",
