@@ -47,7 +47,7 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic: ``values`` per frame, the ``tolerance`` of a change, the greatest allowed magnitude ``within``, in ``unit``."""
+    """One statistic: ``values`` per frame, the ``tolerance`` of a change and the limit ``within`` of its magnitude, in ``unit``."""
 
     tolerance: float = Field(ge=0)
     unit: str

@@ -10,9 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at one place, each with that of the average over places.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = (
-    0.5  # the least difference of averages of changes, as a share of the runs' distance: smaller ones are due to chance
-)
+_LEAST = 0.5  # averages of changes count as differing by at least this share of the runs' distance: less is chance
 _MOVED = 0.01  # below this share of a surface's greatest motion, ratios to the motion have no meaning
 
 

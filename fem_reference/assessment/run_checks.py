@@ -236,9 +236,7 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (
-            one for one in posed if np.abs(points[:9] - one[:9]).max() <= near
-        )  # so that few are compared completely
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number

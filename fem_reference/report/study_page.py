@@ -92,9 +92,7 @@ def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     if REFERENCE in prices and others:
         nearest = min(others, key=lambda solver: others[solver])
         if prices[REFERENCE].best < others[nearest]:
-            said.append(
-                f"Only the reference gets below {number(others[nearest])} {unit}, the least error of {nearest}."
-            )
+            said.append(f"Only the reference gets below {number(others[nearest])} {unit}, the best of {nearest}.")
     return said
 
 
@@ -108,9 +106,7 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
         return f"To halve the error of {one.solver} {verb} {number(one.factor)} times the time ({reach})."
     if one.count > 1:
         return f"More time hardly improves {one.solver} ({reach})."
-    return (
-        f"One setting of {one.solver} is both the fastest and the most accurate: {best} with {label}, {time} a frame."
-    )
+    return f"One setting of {one.solver} is the fastest and the most accurate: {best} with {label}, {time} a frame."
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:

@@ -48,7 +48,7 @@ def test_the_price_of_half_the_error_is_said_in_a_sentence() -> None:
     assert said[0].startswith("To halve the error of fenicsx costs 2.00 times the time")
     assert said[1].startswith("To halve the error of pbd costs 4.00 times the time")
     assert said[1].endswith("(4 settings, from 11.3 mm to 4 mm with sweeps = 8, 80 ms a frame).")
-    assert said[2] == "Only the reference gets below 4 mm, the least error of pbd."
+    assert said[2] == "Only the reference gets below 4 mm, the best of pbd."
 
 
 def test_what_a_case_has_not_has_no_front() -> None:
@@ -70,7 +70,7 @@ def test_half_an_error_that_no_setting_reached_would_cost() -> None:
 
 def test_the_nearest_of_the_other_solvers_is_named() -> None:
     said = study_page.sentences(study("hip", *points("arap", 0.5, 6.0)))
-    assert said[-1] == "Only the reference gets below 4 mm, the least error of pbd."
+    assert said[-1] == "Only the reference gets below 4 mm, the best of pbd."
 
 
 def test_each_drawing_has_the_front_of_its_own_statistic() -> None:
