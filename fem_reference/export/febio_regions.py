@@ -20,7 +20,7 @@ from fem_reference.foundations.mesh import Floats, Ints, tet_volumes
 from fem_reference.problems.muscle import MuscleProblem
 
 MUSCLE = "muscle"  # the name of the elements and the material of a muscle without regions, and the beginning of those of its parts
-# The parameters that an energy is proportional to.
+# The parameters to which an energy is proportional.
 SCALED: dict[type[Effect], tuple[str, ...]] = {
     NeoHooke: ("mu",),
     MooneyRivlin: ("c1", "c2"),
@@ -29,7 +29,7 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters of a part are within this factor of each other; what is less than this share of the greatest counts as that.
+# Parameters in a part differ by at most this factor; those below the second number, a share of the greatest, count as equal to it.
 FACTOR, _LEAST = 1.2, 0.01
 # The points of a quadrature of degree 2 in a tetrahedron, by the shares of its corners.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
@@ -73,7 +73,7 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
 
 
 def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[Floats]:
-    """The parameters (m,) of each tetrahedron: sums over the effects of a kind, of fibres, whose laws differ, by effect."""
+    """The parameters (m,) of each tetrahedron: sums over the effects of a kind; for fibres, whose laws differ, one by effect."""
     found = dict[tuple[object, str], Floats]()
     for i, effect in enumerate(problem.effects):
         for key in SCALED.get(type(effect), ()):
@@ -90,7 +90,7 @@ def _levels(values: Floats) -> Ints:
 
 
 def _scaled(effect: Effect, share: float) -> Effect | None:
-    """The ``effect`` times its ``share``; None where it has none."""
+    """The ``effect`` times its ``share``; None where the share is 0."""
     keys = SCALED.get(type(effect), ())
     if share <= 0 and keys:
         return None
