@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 from fem_reference.assessment.recommendation import Expected, chosen
 
-ERRORS = (1.0, 5.0)  # in the unit of the metric
-RATE = 60.0  # frames a second
+ERRORS = (1.0, 5.0)  # the requested errors, in the unit of the metric
+RATE = 60.0  # the requested rate [frames a second]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The ``best`` setting for a request, of all or None, and ``by_solver``; the ``limits`` of error and time [s] are empty for the
-    knee. ``nearest``: the setting that misses the limits least, where none meets them.
+    """The ``best`` setting of all for a request, None where none meets it, and the best ``by_solver``; the ``limits`` of error and
+    time [s], empty for the knee. ``nearest``: the setting that misses the limits least, where none meets them.
     """
 
     limits: Mapping[str, float]
@@ -40,7 +40,7 @@ def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
 
 def knee(known: Iterable[Expected]) -> Expected | None:
     """The setting at the knee of the front of error against time: in logarithms, farthest below the line that joins its ends (Das
-    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or nowhere below it.
+    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or one that is nowhere below the line.
     """
     front = list[Expected]()
     for one in sorted(known, key=lambda one: (one.time, one.error)):

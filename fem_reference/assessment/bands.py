@@ -10,15 +10,15 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The greatest error of a usable surrogate, as a share of the variance.
+# The greatest error with which a surrogate is still used, as a share of the variance.
 WORST = 0.05
-# The greatest share of missing runs: if more are missing, all of them might lie beyond the 5th or the 95th percentile.
+# The greatest allowed share of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
 MISSING = 0.05
-# The least number of runs whose own 5th and 95th percentile lie between their values.
+# The least number of runs for percentiles without a surrogate: the 5th and the 95th must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
-_SAMPLES = 15  # as a power of 2
-_SHARE = 1e-6  # of the variance of a field, neglected in its principal components
+_SAMPLES = 15  # the number of samples, as a power of 2
+_SHARE = 1e-6  # the share of the variance of a field that its principal components neglect
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Design:
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
     """Points (runs, d) from -1 to 1 of a Latin hypercube: one value of each variable in each of ``runs`` equal parts."""
-    from scipy.stats import qmc  # half a second
+    from scipy.stats import qmc  # here, as importing it takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 

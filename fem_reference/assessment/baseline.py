@@ -25,17 +25,17 @@ from fem_reference.scenes.muscle import MuscleCase
 log = logging.getLogger(__name__)
 
 FORMAT = 1
-# Decimal places that a statistic is stored with, by its unit, and a coordinate [mm].
+# The number of decimal places stored of a statistic, by its unit, and of a coordinate [mm].
 PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
 # The greatest distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
-# The number of sampled vertices, in about 1.3 kB a frame. Motion between them shows in the statistics only.
+# The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices shows in the statistics only.
 SAMPLED = 64
-# The tolerances of a new baseline. Positions [mm]: far below visible differences; a solver whose results differ by more between
-# machines needs more.
+# The tolerance of positions [mm] in a new baseline: far below visible differences. A solver whose results differ by more between
+# machines needs a greater one.
 MOVED = 0.1
-# Of a statistic, at most this share of its greatest value over the frames.
+# The tolerance of a statistic is at most this share of its greatest value over the frames.
 SHARE = 0.02
 # The allowed value is a little above the measured one, for rounding.
 _ROUNDING = 1 + 1e-6
@@ -47,7 +47,7 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic: ``values`` per frame, the ``tolerance`` of a change, the greatest magnitude ``within``, all in ``unit``."""
+    """One statistic: ``values`` per frame, the ``tolerance`` of a change and the limit ``within`` of its magnitude, in ``unit``."""
 
     tolerance: float = Field(ge=0)
     unit: str

@@ -15,13 +15,13 @@ from fem_reference.runs.store import Frame, Run
 
 
 def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also that of moments about the origin. Nothing
-    where it is not fully known: a body that begins moved or under tension; effects of a user's own, follower loads, inertia or
-    drag; loads on cells other than straight tetrahedra; regions that share a prescribed component, whose force counts in each.
+    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also that of moments about the origin. No check
+    where not all forces are known: for a body that begins moved or under tension; effects of a user's own, follower loads, inertia
+    or drag; loads on cells other than straight tetrahedra; regions that share a prescribed component, each with the same force.
     """
     residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)
     allowed, outer = BALANCE * residual * math.sqrt(unknowns), any(one.outer for one in body.effects)
-    for state in () if body.begun else solved.states[1:]:  # the first one is given, as contact or loads may find it
+    for state in () if body.begun else solved.states[1:]:  # the first state is given, and need not be in balance
         load = _load(body, state.number)
         if load is None or not math.isfinite(allowed) or not _counted_once(body, state):
             return

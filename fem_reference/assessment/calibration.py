@@ -21,17 +21,17 @@ COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
 # Shares of a parameter's range: the step of finite differences, and the distance within which a value is at an end.
 _STEP, _AT = 1e-3, 1e-3
-# Estimates whose errors are correlated by more than this are named as a pair.
+# Two estimates whose errors are correlated by more than this are reported as a pair.
 _CORRELATED = 0.95
 # A combination of parameters is undetermined if its singular value is below this share of the greatest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# The values (m,) of runs that correspond to the data, for each of several points (d,) from 0 to 1 of the ranges; None for a point
-# without an answer.
+# A function from several points (d,), in shares of the ranges, to the values (m,) that their runs have for the data; None for a
+# point without an answer.
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
-# The greatest number of evaluations per parameter, besides finite differences.
+# The greatest number of evaluations per parameter, not counting finite differences.
 _MOST = 50
-# The law fits the data if residuals scatter by at most this, in standard deviations of the data.
+# The law fits the data if the residuals scatter by at most this many standard deviations of the data.
 FOLLOWED = 2.0
 _ENDED = "a run that the fit needs has no answer"
 
@@ -70,10 +70,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, by degree of freedom, in standard deviations
-    of the data: near 1 where law and data agree. ``singular``: values of the matrix of sensitivities, in standard deviations by
-    range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: number of points.
-    ``failures``: those that failed; ``ended``: why the fit could not continue, and so has no intervals, else empty;
+    """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, per degree of freedom, in standard deviations
+    of the data: near 1 where law and data agree. ``singular``: singular values of the matrix of sensitivities, in standard
+    deviations per range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: the number of
+    requested runs; ``failures``: those that failed; ``ended``: why the fit could not continue and has no intervals, else empty;
     ``converged``: True where no step leads nearer to the measurements.
     """
 
@@ -91,7 +91,7 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True where the law fits the data, as far as these scatter."""
+        """True where the law fits the data to within their scatter."""
         return self.scatter <= FOLLOWED
 
     @property
@@ -149,7 +149,7 @@ class _Residuals:
         return [self.known[point.tobytes()] for point in points]
 
     def slopes(self, point: Floats, *_: Any) -> Floats:
-        """Differences (m, d) by steps into the range."""
+        """Finite differences (m, d) of the residuals, by steps towards the inside of the ranges."""
         steps = np.where(point < 0.5, _STEP, -_STEP)
         at, *moved = self.at([point, *(point + np.diag(steps))])
         if not np.isfinite([at, *moved]).all():
@@ -157,22 +157,22 @@ class _Residuals:
         return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
 
     def best(self) -> tuple[Floats, Floats] | None:
-        """The point with the least residuals so far, and these; None without any."""
+        """The point with the least residuals so far, and these residuals; None before there are any."""
         points = [(np.frombuffer(key), left) for key, left in self.known.items() if np.isfinite(left).all()]
         return min(points, key=lambda one: float(one[1] @ one[1])) if points else None
 
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
-    """The parameters within their ranges whose values by ``forward`` are nearest to the measurements, in their standard deviations;
-    the fit starts from the case's own values and steps back from a point without an answer. If that is the start, or a point for
-    sensitivities, the fit ends and states so. InputError where there are no more measurements than parameters.
+    """The parameters within their ranges for which the values by ``forward`` are nearest to the measurements, in their standard
+    deviations. The fit starts from the case's own values and steps back from a point without an answer; if that is the start, or a
+    point for sensitivities, the fit ends and states so. InputError unless there are more measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
     residuals = _Residuals(forward, rows)
     start = np.array([min(max(one.place(one.nominal), 0.01), 0.99) for one in parameters])
     try:
-        residuals.slopes(start)  # the fit cannot begin without an answer there
+        residuals.slopes(start)  # first, as the fit cannot begin unless these points have answers
         found = least_squares(
             lambda point: residuals.at([point])[0],
             start,
@@ -191,7 +191,7 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
 
 
 def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
-    """The best point of a fit that could not continue, without intervals; and the residuals there, NaN without any."""
+    """The best point of a fit that could not continue, without intervals, and the residuals there, NaN if there are none."""
     best, freedom = residuals.best(), len(residuals.values) - len(parameters)
     left = np.full(len(residuals.values), np.nan) if best is None else best[1]
     known = () if best is None else zip(parameters, best[0], strict=True)
@@ -225,15 +225,15 @@ def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Pa
 
 
 def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
-    """The estimate at a ``place`` from 0 to 1 of the range, with a half-width of the same."""
+    """The estimate at a ``place`` in its range; the place and the half-width of the interval are shares of the range."""
     at = "low" if place < _AT else "high" if place > 1 - _AT else ""
     low, value, high = (parameter.at(one) for one in (place - width, place, place + width))
     return Estimate(parameter, value, low, high, at)
 
 
 def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
-    """The titles of pairs whose errors are correlated, with the correlation: in the undetermined combinations ``nothing`` where
-    both take part, else in the ``covariance`` of the rest.
+    """The titles of pairs of parameters whose errors are correlated, with the correlation: from the undetermined combinations
+    ``nothing`` if both take part in these, else from the ``covariance`` of the determined ones.
     """
     lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
     for i, one in enumerate(parameters):

@@ -11,7 +11,7 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
-# The relative difference allowed between the value of an experiment and the pinned one: root finding, and other processors.
+# The relative difference allowed between the value of an experiment and the pinned one, due to root finding and processors.
 PINNED = 1e-5
 
 
@@ -43,8 +43,8 @@ class Finding:
 class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
-    ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met to
-    within a half; None: no order is measured. Where ``extrapolated``, the value is that of the last two counts without their
+    ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
+    to within a half; None: no order is measured. Where ``extrapolated``, the value is extrapolated from the last two counts, for an
     error of first order. ``note``: further facts for readers.
     """
 
@@ -107,7 +107,7 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; with the negative control on the finest count of a refinement only."""
+        """The finding; the negative control is measured on the finest count of a refinement only."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
         if self.refinement is None:
             return _finding(self.measure(lab, **given))
@@ -126,8 +126,8 @@ def _finding(found: float | Finding) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry: ``word`` is pass or fail, or inconclusive without a truth, of an experiment within or outside;
-    ``error`` is the absolute error and ``within`` its bound, both in the unit of the entry. They are NaN without a measurement or a
+    """The result of an entry. ``word``: pass or fail, inconclusive without a truth, and for an experiment within or outside;
+    ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry and NaN without a measurement or a
     truth; then the finding's note gives the reason.
     """
 
@@ -145,7 +145,7 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass, fail or inconclusive; of an experiment within or outside its uncertainty, and fail where the value has moved."""
+        """Pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail where the value has moved."""
         judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
         if pinned is None:
             return judged
@@ -155,7 +155,7 @@ class Result:
 
 
 def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_control: bool) -> Result:
-    """The finding of an entry beside its truth."""
+    """The result of an entry: its finding, compared with its truth."""
     truth = entry.known()
     within = entry.within * (abs(truth) if entry.relative else 1.0)
     return Result(entry, finding, truth, within, seconds, with_negative_control)
@@ -194,13 +194,13 @@ class Verification:
 
     @property
     def passed(self) -> str:
-        """The number of these that pass; empty without any."""
+        """The number of judged results that pass, in words; empty where there are none."""
         failed = sum(one in self.failed for one in self.judged)
         return f"{len(self.judged) - failed} of {len(self.judged)} pass" if self.judged else ""
 
     @property
     def beside(self) -> str:
-        """The number of experiments, and of values within their uncertainty; empty without experiments."""
+        """The number of experiments, and of those met within their uncertainty, in words; empty without experiments."""
         words = [one.word for one in self.results if one.entry.kind == "experiment"]
         return f"{words.count('within')} of {len(words)} experiments met within their uncertainty" if words else ""
 

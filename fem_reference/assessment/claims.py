@@ -8,11 +8,11 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.metrics import Measure, described, find
 
-# The finer solution has a separate mesh, with tetrahedra of this share of the size.
+# The finer solution has a mesh of its own, with tetrahedra of this share of the reference's size.
 FINER = 0.8
 # Statistics whose bars are compared with errors: metric and name.
 CLAIMED = tuple(described("claim"))
-# Differences below are rounding, in mm or %.
+# Differences below this are rounding [mm or %].
 LEAST = 1e-6
 
 

@@ -132,8 +132,8 @@ def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
-    ``candidates`` have all frames of the case, NaN where one was not reached; where ``error_bars`` are too wide, nothing is judged.
-    InputError where a case expects a measure of a named run that the run lacks, as it has no surface.
+    ``candidates`` have all frames of the case, NaN where one was not reached; a measure that ``error_bars`` leave in doubt is
+    inconclusive. InputError where the case expects a measure of a named run that lacks it because it has no surface.
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
@@ -152,7 +152,7 @@ def compare(
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
-    if reference.outcome.status == "denied":  # it is no truth
+    if reference.outcome.status == "denied":  # then it is not a truth
         verdicts = tuple(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
@@ -169,7 +169,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference; none of a muscle, whose measures need the context of one."""
+    """The measures and verdicts of a ``run`` without a reference; none for a muscle, whose measures need a reference's context."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
     measures = measure(run, run, context_of(setup, run), names(case.standards("reference")))

@@ -15,9 +15,9 @@ from fem_reference.foundations.records import parse
 from fem_reference.io import texts
 
 FORMAT = 1
-# Features of a case that can be, in any of their units.
+# The least and the greatest value that a feature of a case can have, in its unit.
 _LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
-# The features by which recommendations compare cases; those that they divide by are above zero.
+# The features by which recommendations compare cases; those by which they divide are above zero.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
 _WANT = "a study as the verb study writes it"
@@ -50,13 +50,11 @@ class CaseStudy:
 
     @property
     def certain(self) -> tuple[Point, ...]:
-        """The points with upper bounds of their errors, for any truth within its bar, which is added to each; for the truth
-        itself its bar.
-        """
+        """The points with upper bounds of their errors: each error plus the bar of the truth; for the truth itself its bar."""
         return self._with_errors(operator.add)
 
     def _with_errors(self, of: Callable[[float, float], float]) -> tuple[Point, ...]:
-        """The points with their errors as a function ``of`` error and bar; the truth's errors are its bars."""
+        """The points with each error replaced by a function ``of`` error and bar; the errors of the truth are its bars."""
         names = {name for point in self.points for name in point.errors}
         own = {name: bar for name, bar in self.bars.items() if name in names}
         others = (
@@ -121,7 +119,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_features(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` where a study lacks a feature, or has one that no case can have."""
+    """Raise InputError below ``place`` where a study lacks a feature, or a feature has a value that no case can have."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")
@@ -135,7 +133,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """Raise InputError where a point's changed scene keys are no table, or its tetrahedra have no size."""
+    """Raise InputError where a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

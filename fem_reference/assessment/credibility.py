@@ -17,10 +17,10 @@ from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
-_ROUNDED = 0.5  # of a share that is published in whole per cent
-_WHOLE = 100.0  # per cent of the poses
-_READ = ("publication", "abstract", "quotation", "memory")  # the best first
-# "outside": the model differs from a measurement by more than its uncertainty, whatever else it meets.
+_ROUNDED = 0.5  # the rounding of a share that is published in whole per cent
+_WHOLE = 100.0  # all poses, in per cent
+_READ = ("publication", "abstract", "quotation", "memory")  # the texts in which numbers were read, the best first
+# "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with others.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
@@ -53,8 +53,8 @@ def claims() -> tuple[Evidence, ...]:
 
 @dataclass(frozen=True)
 class Beside:
-    """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, of ``n``
-    specimens, None where unknown; ``validates``: True if being within counts as validation; ``rests_on``: the text in which the
+    """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, from ``n``
+    specimens, None where unknown; ``validates``: True if agreement counts as validation; ``rests_on``: the text in which the
     truth was read, and the unmeasured parts of truth or model; ``kind``: measurement, or model where another model is the truth;
     ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
@@ -76,7 +76,7 @@ class Beside:
 
 
 def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
-    """The number of comparisons of a ``kind`` that are met, and of all of it."""
+    """The number of comparisons of a ``kind`` that are met, and the number of all of that kind."""
     met = [one.met for one in several if one.kind == kind]
     return sum(met), len(met)
 
@@ -111,18 +111,18 @@ class Row:
 
     @property
     def bias(self) -> float:
-        """The mean of these; NaN for none."""
+        """The mean of :attr:`misses`; NaN for none."""
         return float(np.mean(self.misses)) if self.misses else math.nan
 
     @property
     def scatter(self) -> float:
-        """Their standard deviation; NaN for none."""
+        """The standard deviation of :attr:`misses`; NaN for none."""
         return float(np.std(self.misses)) if self.misses else math.nan
 
     @property
     def grade(self) -> Grade:
-        """Outside where one measurement is, else validated by one that counts, indicative by others; verified only where no
-        experiment is known, and not measured where its data is not here. Other models do not enter.
+        """Outside where one measurement is not met, else validated by one that counts and indicative by others; verified only where
+        no experiment is known, and not measured where its data is not installed. Other models do not enter.
         """
         met, of = self.measured
         if of == 0:
@@ -154,7 +154,7 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """A measured entry of the kind experiment; it counts only where every fact does, and no part of its model is from memory."""
+    """A measured entry of the kind experiment; it validates only where each of its facts does and its model is not from memory."""
     entry = found.entry
     facts = entry.facts
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
@@ -171,7 +171,7 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The worst text in which ``facts`` were read; a tolerance without a deviation, and a model, not the DOI alone, from memory."""
+    """The worst text in which ``facts`` were read, with notes: a tolerance chosen by us, or a part of the model from memory."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
@@ -179,8 +179,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms beside a measured curve, which should be inside in all poses, or beside another model's range, of which the arms
-    should cover as much [%] as those of Modenese and Kohout 2020.
+    """Moment arms beside a measured curve, which should be within their range in all poses, or beside another model's range, of
+    which the arms should cover the same share [%] as those of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"

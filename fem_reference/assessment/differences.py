@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; where one frame or statistic is small by chance, the average counts."""
+"""Sizes of differences between two runs; where the difference is small by chance, its average over frames or statistics counts."""
 
 import math
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.runs.store import Run
 
-# Prefixes of statistics that are the value at one place; the average over places goes with each.
+# Prefixes of statistics that are the value at one place, each with that of the average over places.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # share of the distance of two runs: averages of changes that agree better do so by chance
-_MOVED = 0.01  # of a surface's greatest motion: below it, shares of the motion have no meaning
+_LEAST = 0.5  # averages of changes count as differing by at least this share of the runs' distance: less is chance
+_MOVED = 0.01  # below this share of a surface's greatest motion, ratios to the motion have no meaning
 
 
 def greatest(values: Floats) -> float:
@@ -28,12 +28,12 @@ def ratio(differences: Floats, scale: Floats) -> float:
 
 
 def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
-    """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at
-    least the average over the frames for surfaces so far apart. A difference that crosses zero is no evidence of a small error
-    there; where the surfaces are equal it is 0.
+    """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
+    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero is no evidence
+    of a small error there; where the surfaces are equal the size is 0.
 
-    With the motion ``moved`` (f,) [mm] of the surfaces given, the distance counts as at least its share of it in the median
-    frame: two meshes agree better in some poses than in others by chance.
+    If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance counts as at least the motion times the median ratio
+    of distance to motion: by chance two meshes agree better in some poses than in others.
     """
     size = apart
     if moved is not None:
@@ -43,17 +43,17 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
-    """The bar (f,) of independent causes from the ``parts`` (f,) of it by cause, and the greatest of each part over the frames
-    ``there`` (f,), over all where there are none.
+    """The bar (f,) of independent causes from its ``parts`` (f,) by cause, and the greatest value of each part over the frames
+    ``there`` (f,), or over all frames where there are none of these.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest
 
 
 def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:
-    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by metric and statistic (``names``):
-    at least their average share of the ``deviations`` (f,) of the runs from each other, over the frames and the statistics of
-    their metric, and half of it where they are averages.
+    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by metric and statistic (``names``): at
+    least the ``deviations`` (f,) of the runs from each other times the average ratio of difference to deviation, over the frames
+    and the statistics of the metric, and at least half the deviation for averages over places.
 
     By the triangle inequality, changes of the same places differ by at most their deviation, and by less as most of it is not
     along the displacement or cancels. One statistic alone does not show how much less: its difference may be small by chance,

@@ -26,13 +26,13 @@ from fem_reference.runs.store import Frame, Run
 Of = Literal["change", "deviation"]
 FILE = "error_bar.json"
 FORMAT = 2
-# Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
+# The safety factor of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
 # An additional factor for a single fibre: nothing averages there, and two sizes are weaker evidence than three (Roache takes 3
 # for two). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# The rest of an error of first order, relative to the change of the result when its cause is halved. For the cells of a body this
-# is the least order away from rims of constraints, for any element (docs/error_bars.md).
+# The remaining error, of first order, over the change of the result when its cause is halved. For the cells of a body this is the
+# least order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
 # The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where
 # displacement grows with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
@@ -42,7 +42,7 @@ ORDER, ORDER_OF_WORST = 1.5, 1.0
 # 5.3 and 8.8 % of the force on the femur at 1 rad, of gluteus_medius and gluteus_maximus.
 SPREAD = 0.09
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
-# Numbers in a file, which has None for one that is not finite.
+# Numbers as in a file, which has None for a number that is not finite.
 _Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 _Numbers = Annotated[
     Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
@@ -71,7 +71,7 @@ class ErrorBar:
 
     @property
     def widest(self) -> int:
-        """Index of the frame with the greatest bar; an unknown bar counts as the greatest."""
+        """The index of the frame with the greatest bar; an unknown bar counts as the greatest."""
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
 
 
@@ -87,7 +87,7 @@ class ErrorBars:
     bars: tuple[ErrorBar, ...]
 
     def find(self, of: Of, metric: str, statistic: str) -> ErrorBar | None:
-        """The bar of that statistic, None where there is none."""
+        """The bar of a statistic, ``of`` a change or a deviation; None where there is none."""
         wanted = (of, metric, statistic)
         return next((bar for bar in self.bars if (bar.of, bar.metric, bar.statistic) == wanted), None)
 
@@ -133,8 +133,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """Differences of two runs: of changes from rest with the interior fibres of both, and of the deviation of the ``other``'s
-        surface if ``run`` is its reference instead of itself.
+        """Differences of two runs: of their changes from rest, each with its interior fibres, and the deviations of the surface of
+        the ``other`` from that of ``run``.
         """
         against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
         changes = _less(measured(run, None), measured(other, None))
@@ -155,7 +155,7 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
             if one.metric == "volume" and one.statistic in outside:
                 parts[CARRIED] = SAFETY * outside[one.statistic]
             model = _model(one, None if exact is None else exact[of][i], own[i].values if pair.springs else None)
-            there = np.isfinite(one.values)  # an arm has none without a force
+            there = np.isfinite(one.values)  # a moment arm has no value without a force
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, *together(parts, there), model))
     return ErrorBars(pair.fine.numbers, pair.sizes, ORDER, tuple(bars))
 
@@ -185,7 +185,7 @@ def _averaged(
     sizes: list[Floats], kinds: list[tuple[str, str]], spreads: dict[tuple[str, str], Floats]
 ) -> list[Floats]:
     """The ``sizes`` (f,) of differences by metric and statistic; of a signed mean over fibres at least the root mean square of
-    their deviations, which ``spreads`` have. Fibres beside each other err alike, and cancel by chance in one pair of runs only.
+    their deviations, which ``spreads`` have: errors of neighbouring fibres are alike, and cancel in a pair of runs only by chance.
     """
     found = []
     for size, (metric, statistic) in zip(sizes, kinds, strict=True):
@@ -196,7 +196,7 @@ def _averaged(
 
 
 def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
-    """The ``sizes`` (f,) of differences by metric and statistic; of pooled ones at least their root mean square in the metric."""
+    """The ``sizes`` (f,) of differences by metric and statistic; for pooled statistics at least their rms over the metric."""
     pooled: dict[str, list[Floats]] = {}
     for size, kind in zip(sizes, kinds, strict=True):
         if described()[kind].pooled:

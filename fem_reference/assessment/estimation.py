@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` given ``known`` points of each fibre: distances [mm] of the others from its curve, rms and ``greatest``."""
+    """A ``technique`` through ``known`` points of each fibre: distances [mm] of the others from its curve, rms and greatest."""
 
     case: str
     technique: str
@@ -16,8 +16,8 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """Heights of an attached area over its plane by Gaussians with ``centres`` of a ``choice``, fitted to every other vertex: error
-    [mm] at the others, and the condition number of the matrix.
+    """Heights of an attached area over its plane by Gaussians with ``centres`` of a ``choice``, fitted to every second vertex: the
+    error [mm] at the other vertices, and the condition number of the matrix.
     """
 
     case: str
@@ -30,7 +30,7 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """A muscle's surface of ``vertices`` by ``gaussians``: rms and ``greatest`` distance of vertices [mm], volume over the true."""
+    """A muscle's surface of ``vertices`` fitted by ``gaussians``: rms and greatest distance of vertices [mm], ratio of volumes."""
 
     case: str
     vertices: int

@@ -22,8 +22,8 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where known, ``how`` it was
-    taken from the publication, and the kind of text in which it was read (``read_in``).
+    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where known, the way in which it
+    was taken from the publication (``how``), and the kind of text in which it was read (``read_in``).
     """
 
     experiment: str
@@ -102,7 +102,7 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
 
 
 def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
-    """The least and greatest difference of models of muscles from muscles, in a ``quantity``; empty without a source."""
+    """The least and the greatest published difference between models and real muscles in a ``quantity``; empty without sources."""
     return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
 
 

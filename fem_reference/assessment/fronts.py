@@ -25,7 +25,7 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The share of the machine that other processes kept busy during a run, as a cost of it, and the share from which times are longer.
+# The cost that is the share of the machine kept busy by other processes during a run, and the share from which it slows a run.
 LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
@@ -100,9 +100,9 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the cost at half the error on its front over the cost at the whole, NaN
-    where more cost does not improve it; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which
-    ``nearest`` has the best.
+    """The price of accuracy of a ``solver``: ``factor``, the cost at half an error over the cost at the error, on its front, NaN
+    where more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
+    ``nearest``: the point with the best error.
     """
 
     solver: str
@@ -147,7 +147,7 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; of equals the one with less of it."""
+    """The best point of each solver whose error or cost ``same`` is at most ``at``; of equally good ones that with less of it."""
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()
@@ -157,7 +157,7 @@ def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: floa
 
 
 def levels(points: Iterable[Point], error: str, cost: str, *, same: str, count: int = 5) -> tuple[float, ...]:
-    """Errors or costs over the range of the points at which they can be compared: 1, 2 or 5 times a power of ten."""
+    """Errors or costs at which points can be compared, over their range: 1, 2 or 5 times a power of ten."""
     values = [pair[0 if same == error else 1] for point in points if (pair := point.at(error, cost))]
     if not values:
         return ()

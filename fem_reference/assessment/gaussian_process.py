@@ -16,11 +16,11 @@ from scipy.spatial.distance import cdist
 
 from fem_reference.foundations.mesh import Floats
 
-_GROUPS = 10  # of runs that are left out
+_GROUPS = 10  # the number of groups of runs, each left out in turn
 _LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # of variables from -1 to 1; as a share of the variance about the trend
 _START = 1.0, 1e-4
-_LEAST = 1e-24  # of the squares of the outputs: the trend alone may explain them
-_SAMPLES = 13  # as a power of 2
+_LEAST = 1e-24  # the least variance about the trend, as a share of the squares of the outputs: the trend may explain them all
+_SAMPLES = 13  # the number of samples, as a power of 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class GaussianProcess:
     """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
     noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
 
-    ``error``: the mean square of the error at runs that were left out, lengths and all, as a share of the variance of the outputs.
+    ``error``: the mean square of the error at runs left out of the whole fit, lengths too, as a share of the outputs' variance.
     """
 
     points: Floats
@@ -97,7 +97,7 @@ def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
 
 
 def _unlikely(logs: Floats, points: Floats, outputs: Floats) -> tuple[float, Floats]:
-    """The negative logarithm of the likelihood, but for a constant, and its slopes (d + 1,)."""
+    """The negative logarithm of the likelihood, up to a constant, and its slopes (d + 1,)."""
     trend, weights, factor = _solved(points, outputs, logs)
     squares = max(float(((outputs - _terms(points) @ trend) * weights).sum()), _LEAST * float((outputs**2).sum()))
     value = np.log(np.diag(factor[0])).sum() + len(points) / 2 * np.log(squares)

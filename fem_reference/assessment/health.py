@@ -47,7 +47,7 @@ class Followed:
 
     @cached_property
     def bodies(self) -> "tuple[Followed, ...]":
-        """The run of each body; itself where there is one."""
+        """The run of each body; the run itself where there is only one."""
         return tuple(map(self._of, self.spans)) or (self,)
 
     def _of(self, span: Span) -> "Followed":
@@ -68,7 +68,7 @@ class Followed:
         return diagonal(self.surface.points)
 
 
-_LOOKS = 33  # samples of vertex positions on the path from a frame to the next
+_LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
 
 # Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None where there is no particular place.
 Found = tuple[Floats, list[str] | None, Floats | None]
@@ -87,8 +87,8 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """Inverted share: of tetrahedra, in per cent of the volume at rest, where there are some, else of the surface, in per cent of
-    its area. For curved elements, whose corners do not show it, all or nothing, by the least det F.
+    """Inverted share: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its area.
+    For curved elements, whose corners do not show inversion, it is 0 or 100 by the least det F.
     """
     if run.least_determinant is not None:
         words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
@@ -147,8 +147,8 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """Greatest depth of a free vertex inside a bone on the straight path from the last frame, relative to the bone, in per cent
-    of the body's size: a bone that crossed the body is outside of it before and after.
+    """Greatest depth of a free vertex inside a bone on its straight path, relative to the bone, from the previous frame, in per
+    cent of the body's size: it shows a bone that crosses the body and is outside of it at both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
@@ -169,7 +169,7 @@ def _deepest(run: Followed, depths: Floats) -> Found:
 
 
 def pierced(run: Followed) -> Found:
-    """Greatest depth of a vertex of a bone inside the body, in per cent of its size: thin bones fit between the body's vertices."""
+    """Greatest depth of a vertex of a bone inside the body, in per cent of its size, as thin bones fit between its vertices."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -183,8 +183,8 @@ def pierced(run: Followed) -> Found:
 
 
 def crossed(run: Followed) -> Found:
-    """Greatest depth to which bodies, or places of one, go through each other, in per cent of the size: 0 where an exact test finds
-    that no triangles of their surfaces intersect; of one body, where these do not already at rest.
+    """Greatest depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 where an exact test
+    finds that no triangles of their surfaces intersect; of one body, no triangles that do not intersect at rest already.
     """
     values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, finite in enumerate(np.isfinite(run.positions).all(axis=(1, 2))):
@@ -198,7 +198,7 @@ def crossed(run: Followed) -> Found:
 
 def overshoot(run: Followed) -> Found:
     """Greatest distance of a scalar field from the range of its boundary values, in per cent of that range."""
-    assert run.values is not None  # asked of scalar fields only
+    assert run.values is not None  # only scalar fields have this quantity
     low, high = run.range
     beyond = np.maximum(run.values - high, low - run.values).max(axis=1)
     return 100 * np.maximum(beyond, 0.0) / (high - low), None, None

@@ -52,8 +52,8 @@ def range_of(angles: Floats, arms: Floats) -> ArmRange:
 
 
 def share_inside(curve: Floats, found: ArmRange) -> float:
-    """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, of those in which it is known; NaN for
-    none. A range that is not a number contains nothing.
+    """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, among the poses in which it is known; NaN
+    where it is known in none. A range that is not a number contains nothing.
     """
     known = np.isfinite(curve)
     if not known.any():
@@ -117,11 +117,11 @@ class ArmsBeside:
 
     @property
     def known(self) -> int:
-        """The number of poses in which the published arm is known: share, bias and scatter are over these."""
+        """The number of poses in which the published arm is known; share, bias and scatter are taken over these."""
         return int(np.isfinite(self._centre).sum())
 
     def between(self, first: float, last: float) -> "ArmsBeside":
-        """The same in the poses from the ``first`` to the ``last`` angle [deg] alone."""
+        """The same comparison, only in the poses from the ``first`` to the ``last`` angle [deg]."""
         here = (self.found.angles >= first) & (self.found.angles <= last)
         at = self.found.angles[here]
         return replace(self, found=self.found.at(at), middle=self.middle[here], published=self.published.at(at))

@@ -13,7 +13,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
-_CLEAR = 0.01  # the share by which one direction must be softer or stiffer than others to be called so
+_CLEAR = 0.01  # the share by which a direction must differ in stiffness from others to count as softer or stiffer
 # That of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
@@ -71,7 +71,7 @@ def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
 
 
 def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
-    """1 where the cube with fibres at ``degrees`` is softest, or stiffest, of those at 0, 45 and 90 degrees, by 1 %, else 0."""
+    """1 where, of cubes with fibres at 0, 45 and 90 degrees, that at ``degrees`` is softest (or stiffest) by 1 %, else 0."""
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)
     clear = own < (1 - _CLEAR) * min(found.values()) if softest else own > (1 + _CLEAR) * max(found.values())
@@ -137,14 +137,14 @@ def _confinement() -> Quantity:
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
     title = "Strip at a stretch of 1.1: stress along the fibres over that across them"
-    because = "Both stresses are from memory, without deviations: as much as the ratio itself."
+    because = "Both stresses are from memory, without deviations: the tolerance is the ratio itself."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
     return Quantity("strip_stiffness_ratio", title, TAKAZA, of, facts, truth, truth, because, _BARE)
 
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
-    because = "An order: 1 where it is met by 1 % and more, 0 where not."
+    because = "An order: 1 where it is met by 1 % or more, else 0."
     title = f"Cube in compression: {title}"
     return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit, is_order=True)
 

@@ -19,8 +19,8 @@ _BULGE = 0.05
 
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
-    """The check that no muscle is in another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
-    Allowed are the compliance of contact under its pressure and the bulge of facets. Not met where no tetrahedra are stored.
+    """The check that no muscle is inside another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
+    It allows the compliance of contact under its pressure and the bulge of facets. It is not met where no tetrahedra are stored.
     """
     if not problem.apart:
         return ()

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from fem_reference.metrics import described, metric
 
 FORMAT = 1
-# Measures of a run with an omission, against the same solver without.
+# Measures of a run with an omission, relative to the complete run of the same solver.
 MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
 # Where all changes are below this share of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
@@ -21,8 +21,8 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 
 @dataclass(frozen=True)
 class Omission:
-    """A run with something ``left_out``, by name: nothing, one thing, or all possible things; its outcome. ``instead``: settings
-    that had to change with it. A run that was not made has the status ``"refused"``.
+    """A run and its outcome; ``left_out``: names of the effects or features left out: none, one, or all that can be; ``instead``:
+    settings that had to change with them. A run that was not made has the status ``"refused"``.
 
     ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out
     where unknown in a frame. ``predicted``: by the same, the value of an indicator, where there is one. ``costs``: by name, as in
@@ -39,7 +39,7 @@ class Omission:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s]; for the reference of solving only, without compilation. NaN where unknown."""
+        """Processor time [s], for the reference that of solving without compilation; NaN where unknown."""
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
@@ -50,7 +50,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run ``name`` by ``solver``: the ``whole``, and with each of the ``omissions``; ``kept``: names of what is never omitted."""
+    """A run ``name`` by ``solver``: the ``whole`` one, and one with each of the ``omissions``; ``kept``: names never left out."""
 
     name: str
     solver: str

@@ -28,7 +28,7 @@ class Ranked:
 
     @property
     def rank(self) -> str:
-        """In words: ``2``, or ``2 to 4``."""
+        """The possible ranks in words: ``2``, or ``2 to 4``."""
         return str(self.first) if self.first == self.last else f"{self.first} to {self.last}"
 
 

@@ -14,10 +14,10 @@ from fem_reference.assessment.fronts import TETRAHEDRA, Point
 from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
-Features = Mapping[str, float]  # of a case, by name
-# The number of most similar other cases that are used.
+Features = Mapping[str, float]  # the features of a case, by name
+# The number of other cases, the most similar ones, that are used.
 _ALIKE = 3
-# The share of expectations from other cases that are met on each left-out case, for the margin.
+# Margins are such that this share of the expectations from other cases holds on each case that is left out.
 _MET = 0.95
 # The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
@@ -207,7 +207,7 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
                 errors.append(here.error / one.error)
                 times.append(here.time / one.time)
     if not errors:
-        return Margins(2.0, 2.0)  # a single study shows nothing about others
+        return Margins(2.0, 2.0)  # a single study does not show how cases differ
     return Margins(*(max(1.0, float(np.quantile(ratios, _MET))) for ratios in (errors, times)))
 
 

@@ -39,12 +39,12 @@ class Judgement:
 
     @property
     def away(self) -> float:
-        """The distance of the current value from its comparison value."""
+        """The distance of the current value from the value with which it is compared."""
         return abs(self.current - self.was if self.question == "unchanged" else self.current)
 
     @property
     def used(self) -> float:
-        """The used share of the allowed distance; infinite where that is not a number."""
+        """The distance as a share of the allowed one; infinite where that share is not a number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 

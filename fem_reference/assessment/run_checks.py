@@ -24,19 +24,19 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
-# A position is correct up to this share of the body's size; rounding of stored values is a thousandth of it.
+# A position is correct up to this share of the body's size; the rounding of stored values is a thousandth of that.
 ROUNDING = 1e-9
-# Attached vertices deviate from their bone by strain times their distance from the attached facets: stretch up to 4.
+# Exactly attached vertices may be off their bone by this strain (a stretch of 4) times their distance from the attached facets.
 _STRAIN = 3.0
-# Factor on the mean extension of springs from the recorded force: they pull at other points of the surface.
+# Safety factor on the mean extension of springs that follows from the recorded force, as they pull at other points of the surface.
 _SPRINGS = 1.5
-# The greatest rotation of a bone per load step, on average between two frames: beyond it the direction is unknown.
+# The greatest rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# Between contact points, half a spacing apart, a right-angled edge penetrates by a quarter of it, and a crease by less.
+# Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Contact of a part with itself gives by less than this share of the spacing, whatever pressure is recorded.
+# Self-contact of a part allows a penetration of less than this share of the spacing, whatever pressure is recorded.
 _OWN = 0.5
-# Contact gives way where a bone is deeper than this share of half its thickness, for any stiffness.
+# A bone that penetrates by more than this share of half its thickness has broken through contact, for any stiffness.
 _GIVEN_WAY = 0.75
 # The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
 BALANCE = 10.0
@@ -92,13 +92,13 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 rest, along = body.mesh.points[nodes], list(entry.components)
                 wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
-                # Up to this, regions may contradict each other where they meet.
+                # Where two regions meet, what they prescribe may differ by this much.
                 allowed = SAME * (body.size + float(np.abs(wanted).max()))
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch: up to smoothing, pressure over stiffness, what is between points, and is left from rest."""
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and what rest leaves."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -157,8 +157,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """Exact attachments: vertices at the pose of their bone, up to strain times their distance from the attached facets. Springs:
-    their mean extension, the force over stiffness and area; in situ they have a force at rest.
+    """Exact attachments: distance of vertices from where their bone carries them, up to a strain times their distance from the
+    attached facets. Springs: their mean extension, which is force over stiffness and area; in situ they have a force at rest.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
@@ -195,7 +195,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _travel(bone: Bone, before: float, after: float) -> float:
-    """Travel of a bone between two frames, there and back counted twice [rad, or mm]."""
+    """Travel of a bone between two frames [rad or mm]; on a way there and back both directions count."""
     motion = bone.motion
     assert motion is not None  # called for moving bones only
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
@@ -203,8 +203,8 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 without external loads, else equal to
-    these. An effect of a user's own may be such a load, so there is no check with one.
+    """The sums of forces and of moments that bones exert on the muscle, by attachments and contact: 0 without external loads, else
+    in balance with these. An effect of a user's own may be such a load, so with one there is no check.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -231,20 +231,20 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
-    """Index and number of the frames at which muscle or ``bones`` are not at rest, and of all earlier frames."""
+    """Index and number of the frames whose positions of muscle and ``bones`` differ from rest and from all earlier frames."""
     seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few are all compared
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. Where its surface, whose triangles may be large, is deeper than
-    allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
+    """Penetration of the muscle and each bone in contact. Where the muscle's surface, whose triangles may be large, is deeper than
+    allowed, the boundary of its tetrahedra is checked too: the check fails where both are.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -261,7 +261,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle, minus that at rest where above the give of contact; never up to a bone's middle."""
+    """Penetration of a bone and the muscle; above the ``give`` only its part beyond rest. A bone's middle is never allowed."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
@@ -284,7 +284,7 @@ def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> f
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """Self-penetration of the muscle's surface where there is none at rest; where it touches itself, up to the give of contact."""
+    """Self-penetration of the muscle's surface beyond that at rest; with self-contact, up to the penetration that this allows."""
     surface, law, none = run.surface, touching.among(problem.effects), np.zeros(len(run.numbers))
     pressure = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
     most = _OWN * (apart := spacing(surface))

@@ -25,7 +25,7 @@ from fem_reference.runs.writer import places
 
 log = logging.getLogger(__name__)
 
-# Its key in the origin of a run.
+# The key of the second check in the origin of a run.
 RECORD = "second_check"
 
 
@@ -56,7 +56,7 @@ def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Ru
 
 
 def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
-    """The checks of a ``run`` of a muscle; of several, those of each with its name, and that none is in another."""
+    """The checks of a ``run`` of a muscle; of several muscles, those of each with its name, and that none is inside another."""
     if isinstance(problem, MuscleProblem):
         return of_muscle(problem, run, nodes)
     found = list[RunCheck]()

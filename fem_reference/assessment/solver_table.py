@@ -30,7 +30,7 @@ class SolverKind(Record):
 
 
 class ReportSpeed(Record):
-    """The iterations a second that the report's program makes on a case, and the source."""
+    """The iterations per second of the report's program on a case, and the source of that number."""
 
     case: str
     per_second: float = Field(gt=0)
@@ -78,7 +78,7 @@ class SolverResult:
     unsound: str = ""
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
-        """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
+        """The value of greatest magnitude over the frames and its frame; NaN where any frame is NaN, None without the measure."""
         found = find(self.measures, metric, statistic)
         return None if found is None else (found.worst.value, self.numbers[found.worst.index])
 
@@ -96,8 +96,8 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Overall:
-    """A solver's worst frames over scenarios: the ``median`` of magnitudes over the ``count`` where every frame has a number, the
-    ``worst`` of these and its ``case``, and the cases on which it was ``lost``.
+    """A solver's worst frames over scenarios: the ``median`` of their magnitudes over the ``count`` scenarios in which every frame
+    has a number, the ``worst`` of these magnitudes and its ``case``, and the cases on which the solver was ``lost``.
     """
 
     median: float

@@ -52,30 +52,30 @@ class Standing(Record):
 
     @property
     def failed(self) -> bool:
-        """True where it is not to be ranked."""
+        """True where the row is not to be ranked."""
         return self.status != "converged" or bool(self.unsound)
 
     @property
     def ended(self) -> str:
-        """Its end in words: the reason why its frames are no answer, the limit that it exceeded, or its status."""
+        """The end of the run in words: the reason why its frames are no answer, the limit that it exceeded, or its status."""
         late = self.status == "timed out" and self.time_limit is not None
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
     def is_of(self, truth: str, run: str) -> bool:
-        """True where it was measured by this protocol, on runs of these keys."""
+        """True where the row was measured by this protocol, on runs with these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row if its case was not measured again; ``missing``: True if that was not possible."""
+        """The row as it is kept if its case was not measured again; ``missing``: True if that was not possible."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
-        """True where it should be measured again: in the states ``only``, or always if that is empty."""
+        """True where the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
 
 
 class Standings(Record):
-    """The ``rows``; ``missing``: the reason for none, by case, or case and solver; ``changes`` since the last, in words."""
+    """The ``rows``; ``missing``: by case, or case and solver, why there is no row; ``changes``: those since the last standings."""
 
     rows: tuple[Standing, ...]
     missing: dict[str, str]

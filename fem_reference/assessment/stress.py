@@ -77,7 +77,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A row: the name, the title, the signs of a healthy run in words, and as bounds in numbers."""
+    """A row: the name, the title, and the signs of a healthy run, in words and as numerical bounds."""
 
     name: str
     title: str
@@ -110,9 +110,8 @@ Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, for a run that reached every frame, with the verdict on its bounds: on the first violated one, else the first of
-    all. A value that is not finite fails, whatever the status; so does a ``contrast``, which should violate its bound, but does
-    not.
+    """``cell``, for a run that reached every frame, with the verdict by its bounds: by the first violated one, else the first of
+    all. A value that is not finite fails, whatever the status; so does a ``contrast`` without the violation that it should show.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):

@@ -11,7 +11,7 @@ from fem_reference.io.texts import plain
 
 FORMAT = 1
 Place = Literal["inside", "undecided", "outside", "no answer", ""]
-# Of the width of a band: rounding at its ends.
+# The rounding at the ends of a band, as a share of its width.
 _ROUNDING = 1e-6
 
 
@@ -126,13 +126,13 @@ class Placed:
 
     @property
     def share(self) -> float:
-        """The share of the frames that are inside, NaN where none counts."""
+        """The share of the frames in which it is inside; NaN where no frame counts."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 
     @property
     def worst(self) -> float:
-        """The farthest beyond the band over the frames with an answer, 0 inside; NaN for none."""
+        """The greatest distance beyond the band over the frames with an answer, 0 inside it; NaN without such frames."""
         counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one not in ("", "no answer")]
         return float(max(counted, default=math.nan))
 

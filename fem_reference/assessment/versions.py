@@ -71,7 +71,7 @@ class Change:
 
     @property
     def size(self) -> float:
-        """The size by which changes are sorted: the change in error bars, without these relative to the values before and now."""
+        """The size by which changes are sorted: in error bars or, without bars, relative to the values before and now."""
         whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 

@@ -16,11 +16,11 @@ from fem_reference.cli._parser import parser
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
-# Our own mistake, EX_SOFTWARE of sysexits.h. Python's own status for it is 1, which here is a verdict.
+# The status for a defect of our own: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, which here is a verdict.
 BROKEN = 70
-INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
+INTERRUPTED, TERMINATED = 130, 143  # the statuses that shells report for these signals
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
-_CHECKOUT = Path(__file__).resolve().parents[2]  # or the folder that the package is installed in
+_CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder in which the package is installed
 
 
 def entry() -> None:
@@ -28,7 +28,7 @@ def entry() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
     os.environ.setdefault(
         "OPENBLAS_NUM_THREADS", "1"
-    )  # read when numpy is loaded; on a busy machine more threads wait for each other
+    )  # numpy reads it when it is loaded; on a busy machine more threads would wait for each other
     sys.exit(main(sys.argv[1:]))
 
 
@@ -54,14 +54,14 @@ def main(arguments: list[str]) -> int:
         return INTERRUPTED
     except SystemExit:
         raise
-    except BaseException as error:  # no other error may end like a verdict
+    except BaseException as error:  # no error may end with the status of a verdict
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
     return status
 
 
 def _explain(message: str, options: argparse.Namespace) -> None:
-    """Print the page of the documentation that explains a message, in a checkout, which contains it."""
+    """Print the page of the documentation that explains a message, if it exists, as in a checkout."""
     found = page_of(message)
     if found and not options.quiet and (_CHECKOUT / found.partition("#")[0]).exists():
         print(f"see {found}", file=sys.stderr)
@@ -102,8 +102,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError where ``--name`` cannot be the name of a page: names of other files beside pages are reserved."""
-    from fem_reference.report.asked import LONGEST  # here, as packages that it needs may be missing
+    """InputError where ``--name`` cannot be the name of a page: the names of other files beside pages are reserved."""
+    from fem_reference.report.asked import LONGEST  # here, as packages that this module needs may be missing
 
     taken = ("runs", "docs", "index")
     if name is not None and (name in taken or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)):
@@ -112,7 +112,7 @@ def _check_name(name: str | None) -> None:
 
 
 def _check_folder(place: str, folder: Path, *, written: bool) -> None:
-    """InputError at ``place`` unless ``folder`` is one or can be made, and can be written into where it will be."""
+    """InputError at ``place`` unless ``folder`` is a folder or can be made, and, if it is to be ``written``, is writable."""
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")
@@ -126,7 +126,7 @@ def out(options: argparse.Namespace) -> Path:
 
 
 def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
-    """Print ``text``, and write ``facts`` as JSON where that is wanted."""
+    """Print ``text``, and write ``facts`` as JSON if ``--json`` asks for it."""
     print(text)
     _explain(text, options)
     if options.json is not None:
@@ -134,7 +134,7 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
 
 
 def write(path: Path | None, text: str) -> None:
-    """Write a file that is wanted, below a folder that may be new."""
+    """Write ``text`` to ``path``, if there is one, in a folder that is made where it does not exist."""
     if path is not None:
         from fem_reference.io import files
 

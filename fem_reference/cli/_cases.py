@@ -25,7 +25,7 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The case with the changes by ``--set``, the effects that it needs, and the expectations by ``--limit`` of every candidate."""
+    """The case with the changes by ``--set``, the effects that it needs, and the expectations of all candidates by ``--limit``."""
     if options.negative_control and options.set:
         raise InputError("--negative-control", "with --set", "one of the two")
     changes = dict(map(casefile.setting, options.set))
@@ -37,14 +37,14 @@ def scene_of(options: argparse.Namespace) -> Case:
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
-    """The ``case`` of a muscle, where asked at its ``quick`` size, except for what ``--set`` says."""
+    """The ``case`` of a muscle, if asked at its ``quick`` size; keys changed by ``--set`` take precedence."""
     given = dict(map(casefile.setting, options.set))
     sizes = casefile.read_muscle(case, given).quick if quick else {}
     return casefile.read_muscle(case, sizes | given)
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
-    """The expectation of every candidate by METRIC.STATISTIC=VALUE; ``units`` of all statistics, by name."""
+    """The expectation that METRIC.STATISTIC=VALUE states for every candidate; ``units``: those of all statistics, by name."""
     name, _, within = (part.strip() for part in text.partition("="))
     metric, dot, statistic = name.partition(".")
     if not dot or not within:
@@ -69,8 +69,8 @@ def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
 
 
 def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
-    settings of the page table-5-1; and the place that chooses it.
+    """The candidate of the case with the name ``text``, else the recorded frames in the folder ``text``, else the solver of that
+    name with the settings of the page table-5-1; and the option that chooses it.
     """
     names = [candidate.name for candidate in case.candidate]
     if text in names:
@@ -96,12 +96,12 @@ def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = 
 
 
 def command_parts(own: Iterable[Candidate]) -> list[Part]:
-    """The part of a page's name for a command of ``--solver-command``."""
+    """The part that a command of ``--solver-command`` adds to the name of a page."""
     return [Part(("--solver-command", one.settings["command"]), one.name) for one in own]
 
 
 def check_names(names: list[str]) -> None:
-    """InputError where two candidates have one name, or one has that of the reference."""
+    """InputError where two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
             raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
@@ -122,7 +122,7 @@ def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[t
 
 
 def case_part(case: Case) -> Part:
-    """The case of a page: by its name where it is a shipped one, else by its folder."""
+    """The part of a page's name for its case: the name of a shipped case, else its folder."""
     return Part((case.name if case.folder.parent == HOME / "cases" else str(case.folder),))
 
 
@@ -138,7 +138,7 @@ def asked(verb: str, case: Case, options: argparse.Namespace, page: str, *more: 
 
 
 def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
-    """The candidates of a page; nothing where they are the case's own."""
+    """The parts of a page's name for its candidates; none where they are the case's own."""
     found = tuple(chosen)
     if found == case.candidate:
         return ()
@@ -150,13 +150,13 @@ def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
 
 
 def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[str, Any], text: str) -> None:
-    """Print ``text`` (``facts`` as JSON), and write a page into ``--out``, by ``--name`` where that is given."""
-    write_output(facts, text, options)  # also where the page fails
+    """Print ``text`` (with ``--json`` also write ``facts``), and write a page into ``--out``, under ``--name`` if given."""
+    write_output(facts, text, options)  # before the page, which may fail
     print(*written(asked, page, out(options), options.page_name)[1], sep="\n")
 
 
 def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Comparison:
-    """The runs of a case, measured and judged with the error bars that are asked for or cheap."""
+    """The runs of a case, measured and judged with error bars if these are asked for or cheap."""
     reference, *runs = bench.runs(chosen)
     bars = refinement.offered(bench, reference, asked=options.error_bar)
     return judging.compare(bench, reference, runs, bars)
@@ -207,7 +207,7 @@ def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: li
 
 
 def unturned(options: argparse.Namespace, word: str) -> list[str]:
-    """A line for a negative control that did not turn the verdict to fail; empty otherwise."""
+    """A line for a negative control that did not turn the verdict to fail; no line otherwise."""
     if not options.negative_control or word == "fail":
         return []
     why = "its change is not judged here (compare judges candidates too), or is too small"

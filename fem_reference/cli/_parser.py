@@ -18,7 +18,7 @@ CASE = "a shipped case (see list), a case folder or a case.toml"
 
 
 def positive(text: str) -> int:
-    """A number of something, of at most nine digits.
+    """A whole number from 1 to 999999999.
 
     >>> positive("2")
     2
@@ -28,7 +28,7 @@ def positive(text: str) -> int:
     return int(text)
 
 
-# The options that several verbs have.
+# The options that several verbs share.
 _SHARED: dict[str, dict[str, Any]] = {
     "case": {"metavar": "CASE", "help": CASE},
     "--set": {
@@ -70,7 +70,7 @@ _SHARED: dict[str, dict[str, Any]] = {
 
 
 def share(parser: argparse.ArgumentParser, *names: str) -> None:
-    """Add options that several verbs have, by name."""
+    """Add those options, by name, that several verbs share."""
     for name in names:
         parser.add_argument(name, **_SHARED[name])
 
@@ -86,7 +86,7 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line; with ``only`` a verb, that alone is imported: all of them take seconds to load."""
+    """The parser of the whole command line; with ``only`` it imports that verb alone, as loading all of them takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
@@ -103,7 +103,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
-    """The options of a verb, and those that all have."""
+    """Add the options of a verb, and those that all verbs have."""
     sub.register("action", None, _Given)
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False)
     sub.set_defaults(limit=[], writes=True, page_name=None)
@@ -114,7 +114,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 
 
 class _Given(argparse.Action):
-    """The action of an option that may be given once, as a second value would replace the first; lists keep distinct values."""
+    """The action of an option that may be given only once, as a second value would replace the first; a list drops repeats."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         del parser

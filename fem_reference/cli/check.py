@@ -1,7 +1,7 @@
 """The verb ``check``: a candidate against its own earlier results and against the reference, for the author's pipeline.
 
-An inconclusive result has exit status 0: an uncertain reference is not the fault of the change that is checked. The text, the
-Markdown and the JUnit file (as skipped) say so.
+An inconclusive result has exit status 0: an uncertain reference is not the fault of the change that is checked. The text and the
+Markdown file state that it is inconclusive; the JUnit file has it as skipped.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     bench = checked_bench(scene, options, [(entry, place)])
     # Errors of the baseline are reported before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
-    candidate = bench.obtain(entry.name, entry, place)  # first, as it may be bad input
+    candidate = bench.obtain(entry.name, entry, place)  # before the reference, as it may be bad input
     reference = bench.reference()
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:

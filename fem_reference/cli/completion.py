@@ -9,7 +9,7 @@ from fem_reference.cli import DONE, _parser, write_output
 from fem_reference.scenes import casefile
 
 HELP = "print a script with which a shell completes verbs, options and names of cases"
-_COMPLETE = "complete"  # what shtab looks for in an action
+_COMPLETE = "complete"  # the attribute of an action that shtab looks for
 # Commands that complete as ``fem-reference`` does, by the name that shtab gives its function.
 _ALIASES = {
     "bash": "complete -o default -F _shtab_fem_reference fem-reference fem ./fem\n",

@@ -17,7 +17,7 @@ REQUIRED = "required"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """No own options; the verb writes nothing into ``--out``."""
+    """Add no options; the verb writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
 
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _data(case: Case) -> str | None:
-    """The reason why the data of a case is missing, "" where it is present; None for a case without data."""
+    """The reason why the data of a case is missing, "" where it is present; None for a case that needs none."""
     root = os.environ.get(DATA_SETTING)
     if not case.needed_data:
         return None
@@ -53,7 +53,7 @@ def _data(case: Case) -> str | None:
 
 
 def _settings(name: str) -> dict[str, Any]:
-    """The settings of a solver with their defaults, of all that it solves."""
+    """The settings of a solver with their defaults, for all kinds of problems that it solves."""
     found: dict[str, Any] = {}
     for offer in solvers.offers(name):
         fields = offer.settings.model_fields

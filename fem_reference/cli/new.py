@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         unit = {"unit": found.name} | ({"unit_guessed": found.why} if found.why else {})
         said = f"lengths are in {found.name}, guessed: {found.why}; --unit states it\n" if found.why else ""
     place = shlex.quote(str(folder if len(folder.parts) > 1 else f"./{folder}"))
-    call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # the command as it was called
+    call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # the name by which the command was called
     text = f"{said}{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"
     write_output({"folder": str(folder), "scene": str(folder / "case.toml"), **unit}, text, options)
     return DONE

@@ -83,11 +83,11 @@ def _examples(options: argparse.Namespace) -> int:
 
 
 def _table(options: argparse.Namespace) -> int:
-    """The kinds of solvers in the report's table, measured."""
+    """Measure the kinds of solvers in the report's table, and write the page."""
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # the data of a case that is named must not be missing
+        Bench(scenes[name], out(options)).setup()  # an error where a case that the user named lacks its data
     own = own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -128,7 +128,7 @@ def _estimation(options: argparse.Namespace) -> int:
 
 
 def _credibility(options: argparse.Namespace) -> int:
-    """The evidence for each quantity, with moment arms where the anatomy is installed."""
+    """Write the page of the evidence for each quantity, with moment arms where the anatomy is installed."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
     entries = runner.entries().values()

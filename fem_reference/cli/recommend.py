@@ -18,7 +18,7 @@ from fem_reference.studies import cost
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 
-# The notations of frames per second, and of a time per frame.
+# The notations for frames per second, and for a time per frame.
 _RATES = ("fps", "Hz", "frames/s", "1/s")
 _PER_FRAME = re.compile(r"\s*(?:/|per)\s*frame\s*$")
 HELP = "recommend a solver and setting for an error or a time, from the results of studies"
@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting, or without a request those of the page of a study; the exit status is 1 where none meets a request."""
+    """Recommend a setting, without a request those on the page of a study; the exit status is 1 if no setting meets a request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}

@@ -31,9 +31,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
     submitted = "a folder of frames whose candidate.toml has case, name, version and sha256; no code of it is run; may be repeated"
     parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
-    only = f"keep the rows of the last standings but those of these states: {','.join(STATES)}, and new ones"
+    only = f"measure again only the rows in these states ({','.join(STATES)}) and new ones, and keep the others"
     parser.add_argument("--only", default="", metavar="STATES", help=only)
-    limit = "processor time of a solver on a case, except of the reference; what takes more is never ranked (default: %(default)s)"
+    limit = "limit of processor time of a solver, not the reference, on a case; beyond it there is no rank (default: %(default)s)"
     parser.add_argument("--time-limit", default=f"{standings.TIME_LIMIT:g} s", metavar="TIME", help=limit)
     parser.add_argument("--quick", action="store_true", help="cases at their sizes for quick solutions")
     share(parser, "--set", "--name")

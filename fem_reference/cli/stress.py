@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
-    program = "a program in a folder, as in standings; only these run, where --solver names no others; may be repeated"
+    program = "a program in a folder, as in standings; without --solver only such programs run; may be repeated"
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
     many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps, which must agree"
     parser.add_argument("--steps", action="store_true", help=many)

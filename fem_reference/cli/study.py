@@ -30,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
+    """Measure the cost of accuracy on cases; write a page for each case and, where there are several, one for all."""
     given = dict(map(casefile.setting, options.set))
     scenes = [casefile.read_muscle(case, given) for case in options.cases]
     own = own_solver(options, [one for scene in scenes for one in scene.candidate])

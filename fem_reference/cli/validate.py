@@ -12,7 +12,7 @@ from fem_reference.report.words import duration
 from fem_reference.scenes import casefile
 from fem_reference.studies.features import expected
 
-HELP = "check all of a case that can be checked before it is solved, and estimate the cost of running it"
+HELP = "make all checks of a case that are possible before it is solved, and estimate the cost of solving it"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,7 @@ Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 _FEBIO_FILES = """\
 | `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
-| `tet10.csv` | the ten nodes of each of its elements, in the order of FEBio |
+| `tet10.csv` | the ten nodes of each element of `scene.feb`, in FEBio's order |
 """
 _FEBIO_OF_ALL = """
 `scene.feb` is one file of all muscles for FEBio (format 4.0). It logs `nodes_NAME.txt`: put that of a muscle into its folder as
@@ -42,7 +42,7 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
     check(folder)
     for one in _parts(case) if form == "febio" else ():
         febio.check(one)
-    with new_folder(folder) as part:  # made first: that it cannot be written shows before a problem is built
+    with new_folder(folder) as part:  # made first, so that an error shows before a problem is built
         problem = build()
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
@@ -86,7 +86,7 @@ def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Form
 
 
 def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
-    """FEBio's own file, and its differences."""
+    """Write FEBio's own file, and a text on the differences of its model."""
     if isinstance(problem, MusclesProblem):
         differences = febio_several.notes(problem)
         febio.write_model(febio_several.model(problem), folder)

@@ -31,9 +31,9 @@ from fem_reference.io import files
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
-# What FEBio has in the same form.
+# The effects that FEBio has in the same form.
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
-LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md compares
+LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs whose results FEBIO.md compares
 # Newton's method stops at these shares of displacement and energy of the step's first correction: with a dtol of 1e-3
 # the residual force is 0.4 %.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
@@ -86,7 +86,7 @@ def units(first: float) -> str:
 def add_comments(root: Element, texts: Iterable[str]) -> None:
     """Append each of the ``texts`` as a comment of the file."""
     for text in texts:
-        root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))  # two hyphens would end it
+        root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))  # two hyphens would end the comment
 
 
 def model(problem: MuscleProblem) -> Element:
@@ -107,7 +107,7 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Steps from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
+    """Add the control of steps: from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
@@ -125,13 +125,13 @@ def _control(root: Element, problem: MuscleProblem) -> None:
 
 
 def _step(problem: MuscleProblem) -> float:
-    """The initial and longest step [frame numbers]: as many of one length as reach from a frame wanted to the next."""
+    """The initial and longest step [frame numbers]; a whole number of steps reaches from one requested frame to the next."""
     apart = problem.frames[1] - problem.frames[0]
     return apart / ceil(apart / LONGEST_STEP)
 
 
 def _domains(root: Element, problem: MuscleProblem) -> None:
-    """The formulation of the muscle's elements; bones, and the areas that springs hang from, are rigid."""
+    """Add the formulation of the muscle's elements; bones, and the copies of areas that springs pull on, are rigid."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
@@ -168,13 +168,13 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
-    """The load curve of each bone that moves: from 2, without gaps, for FEBio takes an id for a place in their list."""
+    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio takes it for a place in its list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
 def _curves(root: Element, problem: MuscleProblem) -> None:
-    """The times that FEBio must pass, curve 1; then for each bone that moves, how far [rad, mm]."""
+    """Add curve 1 with the times at which FEBio must stop; then for each bone that moves the amount of its motion [rad, mm]."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
     numbers = _curve_numbers(problem)
@@ -196,7 +196,7 @@ def _curve(data: Element, number: int, kind: str, points: list[tuple[float, floa
 
 
 def _output(root: Element) -> None:
-    """Displacements for FEBio's viewer, and the muscle's nodes as text."""
+    """Add the output: displacements for FEBio's viewer, and the muscle's nodes as text."""
     output = SubElement(root, "Output")
     plot = SubElement(output, "plotfile", type="febio")
     SubElement(plot, "var", type="displacement")

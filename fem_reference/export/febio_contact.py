@@ -20,12 +20,12 @@ from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices
 
-SEARCH_RADIUS = 5.0  # [mm]: contact is not looked for deeper than this inside a bone
-# Shear moduli of the matrix with which an overlap at rest may press at once: in gluteus_maximus_anatomical, where it is up to 34 of
-# them, FEBio never took its first step with a search radius of 5 mm, and 0.1 mm, which is 10 of them, helped.
+SEARCH_RADIUS = 5.0  # FEBio looks for contact up to this depth inside a bone [mm]
+# The greatest initial pressure of an overlap at rest, in shear moduli of the matrix: in gluteus_maximus_anatomical, with up to 34,
+# FEBio never took its first step with a search radius of 5 mm; a radius of 0.1 mm, which means up to 10, helped.
 _AT_ONCE = 10.0
-SPRING_SEARCH_RADIUS = 1.0  # [mm]: at rest the two surfaces of springs coincide
-# By penalty alone, in one pass, the penalty as it is given, with the whole tangent.
+SPRING_SEARCH_RADIUS = 1.0  # the search radius of springs [mm], whose two surfaces coincide at rest
+# Contact by penalty alone, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
 # FEBio 4.11 has run springs over facets alone: 5.3 and 8.8 % of the force on the femur off, on gluteus_medius and gluteus_maximus.
 MEASURED = (
@@ -33,7 +33,7 @@ MEASURED = (
     "differ from its own by 0.4 % of the force on the femur and 0.01 mm (rms), with tetrahedra of 12 mm by 1.2 % and 0.04 mm; over "
     "facets by 5.8 % and 0.17 mm (FEBio 4.11, over facets: 5.3 and 8.8 % of the force, up to 1.1 mm, on two muscles of the hip)"
 )
-_FELT = 1e-3  # [mm]: an overlap at rest that is worth a word
+_FELT = 1e-3  # the least overlap at rest that is reported [mm]
 
 
 def has_contact(problem: MuscleProblem) -> bool:
@@ -51,7 +51,7 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
         pair(contacts, "tied-elastic", febio_mesh.springs_id(attached), settings)
     deep, friction = overlaps(problem), (problem.contact.friction or 0.0) if problem.contact else 0.0
     for bone in problem.obstacles:
-        assert problem.contact is not None  # or there is no contact
+        assert problem.contact is not None  # as obstacles exist only with contact
         radius = search_radius(problem, deep[bone.name])
         settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": friction}
         pair(contacts, "sliding-elastic", febio_mesh.bone_id(bone), settings)
@@ -64,13 +64,13 @@ def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) ->
 
 
 def penalty(problem: MuscleProblem, attached: AttachedVertices) -> float:
-    """The penalty [MPa/mm] of springs: over facets their stiffness, at points more by what their triangles are smaller."""
-    assert attached.stiffness is not None  # one by springs
+    """The penalty [MPa/mm] of springs: over facets their stiffness; at points greater, as their triangles are smaller."""
+    assert attached.stiffness is not None  # the attachment is by springs
     return attached.stiffness / (febio_mesh.SHRUNK if attached.attachment in problem.attached_skins else 1.0)
 
 
 def overlaps(problem: MuscleProblem) -> dict[str, float]:
-    """Depths [mm] by bone in contact of the facets of the contact surface inside it at rest: at corners and middles; 0 outside."""
+    """The greatest depth [mm] of the contact surface inside each bone in contact at rest, by corners and middles; 0 outside."""
     if not problem.obstacles:
         return {}
     corners = problem.mesh.points[febio_mesh.free_facets(problem)]
@@ -92,7 +92,7 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
 
 def notes(problem: MuscleProblem) -> list[str]:
     """Differences of the model in FEBio, in sentences with their numbers: regions, springs at points, bones that overlap."""
-    # Springs that the reference has over facets too are the same in FEBio.
+    # Springs that act over facets in the reference too are the same in FEBio.
     on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
     springs = [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else [])]
     return [*febio_regions.note(problem), *springs, *_overlapping(problem)]
@@ -115,7 +115,7 @@ def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
 
 
 def _turning(arms: Floats, areas: Floats) -> Floats:
-    """The moment of inertia (3, 3) [mm4] of ``areas`` (n,) at ``arms`` (n, 3): springs of one stiffness resist turning so."""
+    """The moment of inertia (3, 3) [mm4] of ``areas`` (n,) at ``arms`` (n, 3): the stiffness against turning is in proportion."""
     squares = np.einsum("i,ij,ik->jk", areas, arms, arms)
     return np.asarray(np.trace(squares) * np.eye(3) - squares)
 
@@ -124,7 +124,7 @@ def _overlapping(problem: MuscleProblem) -> Iterator[str]:
     for bone, deep in overlaps(problem).items():
         if deep > _FELT:
             radius = search_radius(problem, deep)
-            assert problem.contact is not None  # or nothing overlaps
+            assert problem.contact is not None  # as overlaps are only reported with contact
             yield (
                 f'bone "{bone}": facets of the tetrahedra begin up to {deep:.2g} mm inside, which FEBio removes in its first step, '
                 f"the reference before; its search_radius is {radius:.2g} mm, and a point deeper than that, pressed by more "

@@ -20,7 +20,7 @@ VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
 
 def add_materials(root: Element, problem: MuscleProblem) -> None:
-    """The materials of the parts of the muscle, numbers from 1 on, and a rigid one for each bone."""
+    """Add the materials of the parts of the muscle, numbered from 1 on, and a rigid material for each bone."""
     materials, own = SubElement(root, "Material"), parts(problem)
     for number, part in enumerate(own, start=1):
         _muscle(materials, number, part)
@@ -32,7 +32,7 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
 
 
 def _muscle(materials: Element, number: int, part: Piece) -> None:
-    """One material where FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
+    """Add one material if FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
     matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
     passive = [effect for effect in part.effects if isinstance(effect, FibrePassive)]
@@ -48,7 +48,7 @@ def _muscle(materials: Element, number: int, part: Piece) -> None:
 
 
 def _leaves(parent: Element, constants: dict[str, float]) -> None:
-    """The constants of a material; of one with fibres (``lam_max``) also their direction: the first axis of each element."""
+    """Add the constants of a material; if it has fibres (``lam_max``), also their direction: the first axis of each element."""
     leaves(parent, constants)
     if "lam_max" in constants:
         leaf(SubElement(parent, "fiber", type="vector"), "vector", "1,0,0")
@@ -76,8 +76,8 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 
 def fibre_constants(effect: FibrePassive) -> dict[str, float]:
-    """The constants [MPa, 1] of FEBio's ``muscle material`` that leave its passive fibres alone: no shear moduli (``g1``, ``g2``,
-    ``g3``), no activation. Its ``lam_max`` is a stretch from rest, ``linear_from`` one from optimal length.
+    """The constants [MPa, 1] of FEBio's ``muscle material`` that leave only its passive fibres: no shear moduli (``g1``, ``g2``,
+    ``g3``), no activation. Its ``lam_max`` is a stretch relative to rest, ``linear_from`` relative to the optimal length.
     """
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}
@@ -85,7 +85,7 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
 
 
 def add_fibres(root: Element, problem: MuscleProblem) -> None:
-    """The axes of each element: the first along the fibre, the second anywhere across it."""
+    """Add the axes of each element: the first along the fibre, the second in any direction across it."""
     if problem.directions is None:
         return
     section = SubElement(root, "MeshData")

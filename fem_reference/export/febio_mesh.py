@@ -14,44 +14,44 @@ from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
-# Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
+# The pairs of corners between which the last six nodes of a tet10 lie; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is turned round
-# Springs at points are small rigid triangles of this share of the points' areas, with a penalty that is as much greater.
+# Springs at points are small rigid triangles of this share of the points' areas; their penalty is divided by this share.
 SHRUNK = 0.01
-_LEAST_AREA = 1e-6  # of the greatest: a point of less has no spring
+_LEAST_AREA = 1e-6  # a point with less than this share of the greatest area has no spring
 _CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
-    """An element with a text and nothing below it."""
+    """Add an element with a text and nothing below it."""
     SubElement(parent, tag, attributes).text = str(text)
 
 
 def leaves(parent: Element, values: Mapping[str, object]) -> None:
-    """Elements with the ``values`` as their texts, by tag."""
+    """Add elements by tag, with the ``values`` as their texts."""
     for tag, value in values.items():
         leaf(parent, tag, value)
 
 
 def rows(parent: Element, tag: str, values: Iterable[Sequence[float]], first: int = 1) -> None:
-    """Elements of one ``tag``, numbered from ``first``, with numbers in full."""
+    """Add elements of one ``tag``, numbered from ``first`` on, with all digits of their ``values``."""
     for number, row in enumerate(values, start=first):
         leaf(parent, tag, ",".join(map(repr, row)), id=str(number))
 
 
 def vector(values: Iterable[float]) -> str:
-    """Numbers in full, as FEBio reads them."""
+    """Numbers with all their digits, as FEBio reads them."""
     return ",".join(repr(float(value)) for value in values)
 
 
 def bone_id(bone: Bone) -> str:
-    """The name of a bone in the file: of its material, of its elements."""
+    """The name of a bone in the file, which its material and its elements have."""
     return f"bone_{bone.name}"
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """The name of the springs of an attachment in the file: of their shells on the bone, of their surfaces."""
+    """The name of the springs of an attachment in the file, which their shells on the bone and their surfaces have."""
     return f"springs_{attached.attachment}"
 
 
@@ -80,13 +80,13 @@ def outward(surface: Surface) -> Surface:
 
 
 def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
-    """Mask (m,) of the ``facets`` (m, 3) that are among ``others`` (k, 3), whichever corner is first."""
+    """Mask (m,) of the ``facets`` (m, 3) that are among ``others`` (k, 3), in any order of their corners."""
     known = set(map(tuple, np.sort(others, axis=1).tolist()))
     return np.array([tuple(facet) in known for facet in np.sort(facets, axis=1).tolist()], bool)
 
 
 def free_facets(problem: MuscleProblem) -> Ints:
-    """The facets (m, 3) of tets in contact: not attached, and contact is felt in their middle; InputError without any."""
+    """The facets (m, 3) of tets in contact: those not attached whose middle is not exempt; InputError without any."""
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
     loose = outer[~among(outer, attached)]
@@ -111,8 +111,8 @@ class SpringPoints(NamedTuple):
 
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
-    """The points of springs that stand at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so that a
-    triangle of ``SHRUNK`` of a point's area, in the plane of its facet, is a spring at that point.
+    """The points of springs that act at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so a triangle
+    with the share ``SHRUNK`` of a point's area, in the plane of its facet, is a spring at that point.
     """
     skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
     of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))
@@ -120,7 +120,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
     corners = problem.mesh.points[outer[near.triangle]]
     scale = np.sqrt(SHRUNK * skin.areas[of] / corner_areas(corners))[:, None]
     least = scale / 3 + _CLEAR
-    more = np.maximum(near.barycentric - least, 0.0)  # what is above the least, as much of it as all shares leave
+    more = np.maximum(near.barycentric - least, 0.0)  # the parts above the least share, which are scaled below
     inside = least + more * (1 - 3 * least) / more.sum(axis=1, keepdims=True)
     points = np.einsum("nc,nci->ni", inside, corners)
     small = points[:, None] + scale[:, :, None] * (corners - corners.mean(axis=1, keepdims=True))
@@ -138,7 +138,7 @@ class Mesh:
         self.outer, _ = boundary(problem.mesh.tets)
 
     def add_to(self, root: Element) -> None:
-        """The section ``Mesh``: sets and surfaces after all nodes and elements."""
+        """Add the section ``Mesh``, with sets and surfaces after all nodes and elements."""
         mesh, groups = SubElement(root, "Mesh"), [(MUSCLE, "tet10", self.points, self.tets)]
         for bone in self.problem.bones:
             surface = outward(bone.surface)
@@ -166,7 +166,7 @@ class Mesh:
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
     def _area(self, attached: AttachedVertices) -> Ints:
-        """The triangles (m, 6) of an attachment, outward; of springs at points those with points on them."""
+        """The triangles (m, 6) of an attachment, facing outwards; for springs at points, the triangles with such points."""
         if attached.attachment in self.problem.attached_skins:
             return self.curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
         return self.curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
@@ -190,7 +190,7 @@ class Mesh:
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
-        """The contact surface, and its pairs with the bones."""
+        """Add the contact surface, and its pairs with the bones."""
         self.surface(mesh, "muscle_free", "tri6", self.curved(free_facets(self.problem)))
         names = [bone_id(bone) for bone in self.problem.obstacles]
         for name in names:
@@ -199,7 +199,7 @@ class Mesh:
             self.pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
 
     def _tied(self, mesh: Element, attached: AttachedVertices, copy: Ints) -> None:
-        """The area attached and its rigid copy, the primary one: FEBio integrates over that."""
+        """Add the area attached, and its rigid copy as the primary surface, over which FEBio integrates."""
         name = springs_id(attached)
         self.surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
         self.surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)
@@ -207,10 +207,10 @@ class Mesh:
 
     @staticmethod
     def surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        """A surface by ``name`` of ``facets`` (m, 3 or 6), nodes from 0, of a ``kind``."""
+        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``; their nodes count from 0."""
         rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod
     def pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
-        """A pair of surfaces by their names."""
+        """Add a pair of surfaces by their names."""
         leaves(SubElement(mesh, "SurfacePair", name=name), {"primary": primary, "secondary": secondary})

@@ -20,7 +20,7 @@ from fem_reference.foundations.mesh import Floats, Ints, tet_volumes
 from fem_reference.problems.muscle import MuscleProblem
 
 MUSCLE = "muscle"  # the name of the elements and the material of a muscle without regions, and the beginning of those of its parts
-# The parameters that an energy is proportional to.
+# The parameters to which an energy is proportional.
 SCALED: dict[type[Effect], tuple[str, ...]] = {
     NeoHooke: ("mu",),
     MooneyRivlin: ("c1", "c2"),
@@ -29,7 +29,7 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters of a part are within this factor of each other; fibres of less than this share of the greatest count as that.
+# Parameters in a part differ by at most this factor; those of fibres below this share of the greatest count as equal to it.
 FACTOR, _LEAST = 1.2, 0.01
 # The parameters of fibres, which end where a region does.
 _OF_FIBRES = ("stress", "c3", "c5")
@@ -75,7 +75,7 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
 
 
 def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[str, Floats]]:
-    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind, of fibres, whose laws differ, by effect."""
+    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind; for fibres, by effect."""
     found = dict[tuple[object, str], Floats]()
     for i, effect in enumerate(problem.effects):
         for key in SCALED.get(type(effect), ()):
@@ -92,7 +92,7 @@ def _levels(key: str, values: Floats) -> Ints:
 
 
 def _scaled(effect: Effect, share: float) -> Effect | None:
-    """The ``effect`` times its ``share``; None where it has none."""
+    """The ``effect`` times its ``share``; None where the share is 0."""
     keys = SCALED.get(type(effect), ())
     if share <= 0 and keys:
         return None

@@ -6,7 +6,7 @@ from fem_reference.export import febio, febio_contact, febio_mesh
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.problems.muscles import MusclesProblem
 
-# What names something, and what refers to it: attributes, and tags of texts.
+# Attributes that name or refer to something, and tags whose text does.
 _ATTRIBUTES = ("name", "mat", "node_set", "elem_set", "surface_pair")
 _TEXTS = ("primary", "secondary", "rb")
 # Entries that are numbered over all muscles, and those whose text is numbers of nodes.
@@ -18,7 +18,7 @@ _FIRST = ("Nodes", "Elements")  # of a mesh
 
 
 def model(problem: MusclesProblem) -> Element:
-    """The whole input file: names of a muscle have its own before them, as ``deep_muscle``."""
+    """The whole input file; all names of a muscle begin with its own name, as in ``deep_muscle``."""
     root = Element("febio_spec", version="4.0")
     sections = {tag: Element(tag) for tag in _ORDER}
     before = dict.fromkeys(_NUMBERED.values(), 0)
@@ -28,7 +28,7 @@ def model(problem: MusclesProblem) -> Element:
         mesh.surface(_found(own, "Mesh"), "touching", "tri6", mesh.curved(one.body.mesh.facets["free"]))
         _renamed(own, name, before)
         for section in own:
-            if section.tag in sections:  # comments are made of all muscles, below
+            if section.tag in sections:  # comments, for all muscles together, are added below
                 _add(sections[section.tag], section)
     first = next(iter(problem.problems.values()))
     febio.add_comments(root, (febio.units(first.frames[0]), *notes(problem)))
@@ -39,14 +39,14 @@ def model(problem: MusclesProblem) -> Element:
 
 
 def _found(root: Element, tag: str) -> Element:
-    """The entry with a ``tag``, which is there."""
+    """The entry with a ``tag``, which must exist."""
     found = root.find(tag)
     assert found is not None
     return found
 
 
 def _add(known: Element, more: Element) -> None:
-    """Add the entries of a section of another muscle: of output what is logged alone."""
+    """Add the entries of a section of another muscle; of its output only what is logged."""
     if known.tag in _ONCE and (len(known) or known.attrib):
         return
     known.attrib |= more.attrib
@@ -57,7 +57,7 @@ def _add(known: Element, more: Element) -> None:
 
 
 def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
-    """Put the ``name`` of a muscle before all names, and count its numbers from those ``before``, which are counted on."""
+    """Put the ``name`` of a muscle before all its names, and count its numbers on from those ``before``, which are updated."""
     most = dict(before)
     for entry in root.iter():
         for key in set(_ATTRIBUTES) & set(entry.keys()):
@@ -79,12 +79,12 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Contact of each two muscles that may touch: in two passes, each with half the stiffness, as both sides have half in the
-    reference.
+    """Add contact between each two muscles that may touch: in two passes, each with half the stiffness, as each side has half of
+    it in the reference.
     """
     if not problem.pairs:
         return
-    assert problem.law is not None  # or no two may touch
+    assert problem.law is not None  # as muscles touch only by a law
     for k, (one, other) in enumerate(problem.pairs):
         name = f"touching_{k}_{one}_{other}"
         febio_mesh.Mesh.pair(sections["Mesh"], f"{name}_pair", f"{one}_touching", f"{other}_touching")

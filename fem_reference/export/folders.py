@@ -1,4 +1,4 @@
-"""The folder of an export, a new one, written whole or not at all, and the texts in it, which are files of this folder."""
+"""The new folder of an export, written whole or not at all, and its texts, whose templates are beside this module."""
 
 import os
 import shutil
@@ -35,12 +35,12 @@ def new_folder(folder: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(part, ignore_errors=True)
         for parent in above:
-            with suppress(OSError):  # not empty, as after success
+            with suppress(OSError):  # the folder is not empty, as after success
                 parent.rmdir()
 
 
 def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
-    """Write the text of a ``file`` of this folder, by default that of the same name, with facts of the ``case`` and ``values``."""
+    """Write the template ``file``, by default the one named as ``path``, filled with facts of the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
     known = {
         "title": case.title,

@@ -60,8 +60,8 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
 
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
-    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0. They are on the central axis, about which
-    the moment is along the force, nearest to the middle of the attachment, or to the origin for a bone without one.
+    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0: the points of the central axis, about which
+    the moment is along the force, that are nearest to the middle of the attachment, or to the origin for a bone without one.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)

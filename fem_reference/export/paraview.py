@@ -36,7 +36,7 @@ INDEX = "runs.pvd"
 _NO_STATES = """
 The reference was solved without `reference.store_state = true`: the arrays that follow from its states are not here.
 """
-# Results that are evaluated from states; displacement is written anyway.
+# Results that are evaluated from states; displacement is always written.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
 # The statistic of the greatest distance to the reference, by the name of its error bar.
@@ -75,7 +75,7 @@ class _Frames:
             found = embed(self.results.mesh, self.setup.surface.points)
             inside = np.clip(
                 found.barycentric, 0, None
-            )  # a vertex outside of the tetrahedra has the values at their skin
+            )  # a vertex outside the tetrahedra gets the values at their boundary
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
         self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
@@ -89,7 +89,7 @@ class _Frames:
             yield "distance_to_bones", gaps
         if run is self.reference:
             pressed = contact.among(self.case.effects) is not None and in_situ.among(self.case.effects) is None
-            if gaps is not None and pressed:  # in situ it follows from the gaps at rest, which only the solver knows
+            if gaps is not None and pressed:  # in situ it depends on gaps at rest, which only the solver knows
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -103,7 +103,7 @@ class _Frames:
     def _contact_pressure(self) -> Floats:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
         effect = contact.among(self.case.effects)
-        assert effect is not None  # the caller asked
+        assert effect is not None  # the caller checked it
         law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
         bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]
         pressures = np.zeros(run.positions.shape[:2])
@@ -153,7 +153,7 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference, with results that jump between them at their middles, and the least det F at their corners."""
+    """The tetrahedra of a reference; results that jump between them are at their middles, the least det F at their corners."""
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)

@@ -24,14 +24,14 @@ from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
 # The most bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The values of a
-# text take up to thirty times as much memory.
+# text file take up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
-# The age [s] above which a half-written file is removed whose process does not run here: it may run on another machine.
+# The age [s] above which a half-written file is removed if its process does not run here; before, it may run on another machine.
 _SETTLED = 10.0
 
 
 def shares_points(place: str) -> bool:
-    """True where triangles read from ``place`` share points, in the order of the file; False where each has three own points."""
+    """True where triangles read from ``place`` share points, in the order of the file; False where each has three of its own."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
@@ -47,8 +47,8 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 def read_surface(path: Path, unit: float) -> Surface:
     """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
 
-    An STL file has no shared points: its surface has three points a triangle. InputError where the file cannot be read
-    whole or has other polygons than triangles.
+    An STL file has no shared points: its surface has three points for each triangle. InputError where the file cannot be read
+    completely or has polygons other than triangles.
     """
     want = f"a triangle surface, whole, as {' '.join(formats())}"
     read = _format(path, want, formats()).read
@@ -57,8 +57,8 @@ def read_surface(path: Path, unit: float) -> Surface:
 
 
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
-    """The skin of those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (``gmsh:physical``
-    of gmsh); its coordinates are in units of ``unit`` mm. InputError where the file has no such array or none of the labels.
+    """The boundary of those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (gmsh's is
+    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError where the file lacks the array or all of the labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
@@ -85,8 +85,8 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
 def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines:
     """The lines of a VTK or VTP file in units of ``unit`` mm; cells that begin where another ends are joined to it.
 
-    InputError where it cannot be read whole. ``moved`` states that the lines are those of a moved state; otherwise it is an error
-    too if a point is not finite or a line has no length.
+    InputError where it cannot be read completely. ``moved``: True for lines of a moved state; in a state at rest, a point that is
+    not finite or a line without length is an error too.
     """
     want = f"polylines, whole, as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
@@ -103,7 +103,7 @@ def read_points(path: Path) -> Floats:
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
     """Time and surface of each step of a temporal collection, in units of ``unit`` mm.
 
-    The points are moved by the point data ``displacement``, or ``u`` where that is its name.
+    The points are moved by the point data named ``displacement`` or ``u``.
     """
     want = "an XDMF time series of one triangle mesh with its displacement"
     steps = _attempt(xdmf.read, path, want)
@@ -137,7 +137,7 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
     """The surface with its points at ``positions`` (n, 3) [mm]; in VTK's formats with point data ``displacement`` [mm], float64."""
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
-    assert write is not None  # of a suffix that is written
+    assert write is not None  # the suffix is one of those that are written
     with whole(path) as part:
         write(part, surface.moved_to(positions), positions - surface.points)
 
@@ -158,7 +158,7 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
 def write_field(
     path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
 ) -> None:
-    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3), with arrays by name: (n, ...) and (m, ...)."""
+    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3), with arrays by name, (n, ...) or (m, ...)."""
     import meshio
 
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
@@ -169,14 +169,14 @@ def write_field(
 
 
 def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
-    """PVD index: the time of each file (of frames their number), which is named relative to the index."""
+    """Write a PVD index: the time of each file (for frames their number), and its path relative to the index."""
     entries = "".join(f'<DataSet timestep="{time}" file={quoteattr(name)}/>\n' for time, name in frames)
     collection = f'<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
     write_text(path, f'<?xml version="1.0"?>\n{collection}')
 
 
 def write_text(path: Path, text: str) -> None:
-    """The text in UTF-8; into ``path`` itself where that is a pipe or a device."""
+    """Write ``text`` in UTF-8; directly into ``path`` if that is a pipe or a device."""
     if path.exists() and not path.is_file():
         try:
             path.write_text(text, encoding="utf-8")
@@ -189,8 +189,8 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which replaces it on success and is removed otherwise. An OSError names ``path`` and the
-    free space, where the disk is full.
+    """A file beside ``path`` to write to, which replaces it on success and is removed otherwise. An OSError names ``path`` and, if
+    the disk is full, the free space.
     """
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
@@ -233,7 +233,7 @@ def clear(path: Path) -> None:
 
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
-    """The result of ``read`` for a file; any error that a damaged file causes becomes an InputError."""
+    """The result of ``read`` for a file; any error due to a damaged file becomes an InputError."""
     if not is_file(path):
         raise InputError(path, "no file", want)
     check_size(path, MOST_BYTES, want)

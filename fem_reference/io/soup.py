@@ -1,4 +1,4 @@
-"""Points, triangles and lines as readers of any format return them: checks that they all share."""
+"""Points, triangles and lines as the readers of all formats return them, and the checks that these readers share."""
 
 import re
 from collections import Counter
@@ -20,7 +20,7 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
         raise ValueError("no vertices")
     if points.shape != (len(points), 3):
         raise ValueError(f"points of shape {points.shape}")
-    with np.errstate(invalid="ignore"):  # NaN becomes an integer; the comparison below finds it
+    with np.errstate(invalid="ignore"):  # NaN becomes some integer, which the comparison below finds
         triangles = np.asarray(soup[1], np.int64)
     if triangles.shape != (len(triangles), 3) or (triangles != corners).any():
         raise ValueError(f"corners of shape {corners.shape} that are not three point numbers each")
@@ -54,7 +54,7 @@ def joined(cells: list[list[int]]) -> list[list[int]]:
 
 
 def only_triangles(corners: set[int]) -> None:
-    """ValueError where polygons have another number of corners than three."""
+    """ValueError where a polygon has more or fewer corners than three."""
     if other := corners - {3}:
         raise ValueError(f"a polygon of {min(other)} corners")
 
@@ -67,7 +67,7 @@ def positions(rows: list[list[float]]) -> Any:
 
 
 def rows(points: Floats) -> list[str]:
-    """One text for each of ``points`` (n, 3), with the digits from which the same floats are read."""
+    """A text for each of ``points`` (n, 3), with enough digits to read the same floats again."""
     return [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist()]
 
 

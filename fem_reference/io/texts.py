@@ -25,7 +25,7 @@ MOST_JSON = 2**25
 DEEPEST = 32
 # A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
-# Parts of TOML that are not keys: strings of its four kinds, and comments.
+# Parts of a TOML text that are not keys: strings of all four kinds, and comments.
 _NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
 # Reading a dotted key takes time that grows as the square of its number of parts.
 _LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{DEEPEST},}}")
@@ -73,7 +73,7 @@ def check_no_entities(text: bytes) -> None:
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` that the file at ``path`` refers to; ValueError where it is outside the folder, after following links."""
+    """The file ``name`` to which the file at ``path`` refers; ValueError where it is outside its folder, after following links."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')

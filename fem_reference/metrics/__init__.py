@@ -35,10 +35,10 @@ class Statistic:
     """The description of a statistic by its metric.
 
     ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
-    ``curve``: the title of the drawing of its changes from rest; ``share_of``: the whole of a per cent; ``shown``: by place, its
-    position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``: True
-    for the value of a single fibre, or of the force on a bone, which is no mean; ``pooled``: True where the statistics of its
-    metric are of one field in one unit, so that a difference that is small in one by chance is replaced by that of all.
+    ``curve``: the title of the drawing of its changes from rest; ``share_of``: the quantity that is 100 %; ``shown``: by place,
+    its position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``:
+    True for the value of a single fibre, or of the force on a bone, which is no mean; ``pooled``: True where the statistics of its
+    metric are of one field in one unit, so that a difference that is small by chance in one is replaced by the rms of all.
     """
 
     unit: str
@@ -59,7 +59,7 @@ class Statistic:
 
     @property
     def full_unit(self) -> str:
-        """The unit, for a per cent with its whole."""
+        """The unit; for per cent with the quantity that is 100 %."""
         return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
 
 
@@ -176,7 +176,7 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if reference.fibres is None:
         place = f"{reference.name}: fibres"
         raise InputError(place, "a run without an interior", "a reference that carries the fibres")
-    own = cast("Setup", setup)  # of one muscle: those of several are measured each by itself
+    own = cast("Setup", setup)  # of a single muscle: of several, each is measured by itself
     context = MeasurementContext.of(reference, reference.fibres, own.bones, own.exempt, own.joints)
     return replace(context, ends=attached_ends(own.attached, context.exempt, reference.fibres))
 
@@ -242,7 +242,7 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from ``values`` (f,) by statistic, all worst at the places ``where`` (f,), if any."""
+    """The measures of the metric ``name`` from ``values`` (f,) by statistic; ``where`` (f,): the worst places of all, if known."""
     stated = metric(name).STATISTICS
     return tuple(
         Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()
@@ -265,7 +265,7 @@ def at_rest(run: Run) -> Run:
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """Every statistic of the change from rest of a ``run`` of the reference's solver, on its own fibres. Where overlaps with bones
-    are removed first, the fibres of two runs differ at rest; on those of another run, they would be carried by the surface.
+    are removed first, the fibres of two runs differ at rest, and its surface would have to carry those of another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)

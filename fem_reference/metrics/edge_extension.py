@@ -23,7 +23,7 @@ OF, AGAINST = "surface", "reference"
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean``, the ``rms``, and
-    of the magnitude the 95th percentile ``p95`` and the greatest ``max``.
+    of the magnitude the 95th percentile (``p95``) and the greatest (``max``).
 
     An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_of_edges`` all edges have the same
     weight, as in the report.
@@ -35,7 +35,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
-    """The measures ``name`` of ``deviations`` (f, e) by edge, and ``more`` (f,), worst at the edge of the greatest magnitude."""
+    """The measures ``name`` from ``deviations`` (f, e) by edge and ``more`` (f,); the worst place: the edge that deviates most."""
     size = np.abs(deviations)
     values = {
         "mean": deviations @ edges.areas / edges.areas.sum(),

@@ -17,7 +17,7 @@ from fem_reference.problems.fibre_ends import ends_of
 from fem_reference.runs.store import Run
 
 _TITLE = "Fibre length"
-# Fibres are few lines that end at rims, so that one of them may be most of their mean square: all statistics are local.
+# Fibres are few and end at rims, so one of them may contribute most of the mean square: all statistics count as local.
 _of_lines = partial(Statistic, local=True)
 STATISTICS = {
     "mean": _of_lines("mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}),
@@ -32,9 +32,9 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
+# Fibre points within this distance [mm] of the measurement context's are the same points, read from a file in single precision.
 _SAME = 1e-3
-# The same for a run of lines alone: a reference whose overlaps with bones were removed begins up to so far from the rest state.
+# The same for a run of lines alone: a reference begins up to this far from the rest state if overlaps with bones were removed.
 _RELAXED = 5.0
 
 
@@ -72,9 +72,9 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
-    """The greatest error [mm] over the fibres that the extension makes on the reference's own surface.
+    """The greatest error [mm] over the fibres of lengths by the extension, measured on the reference's own surface.
 
-    The error is L by extension less L inside; NaN where the reference does not carry the measurement context's fibres.
+    The error is L by extension minus L inside; NaN where the reference does not carry the measurement context's fibres.
     """
     if _carries(reference, context):
         errors = _lengths(reference, context, inside=False) - _lengths(reference, context, inside=True)

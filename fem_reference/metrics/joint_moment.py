@@ -4,7 +4,7 @@ A moment is positive where it turns the bone to greater angles; its moment arm i
 space. By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull
 at their ends, via-points and obstacles. The force is not known for lines without ``hill``, nor for most fast solvers.
 
-The arm is not that by the excursion of fibres: a bent matrix bears a moment with little force (docs/measures.md).
+The arm differs from that by the excursion of fibres: a bent matrix bears a moment with little force (docs/measures.md).
 """
 
 from functools import partial
@@ -35,11 +35,11 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # of the greatest force, below which a force is round-off and has no arm
+_LEAST = 1e-6  # a force below this share of the greatest one is round-off and has no arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]; NaN where no joint turns alone, the arm also without force."""
+    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN where no joint turns alone; the arm also without force."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):

@@ -56,7 +56,7 @@ def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequen
 
 
 def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Sequence[int]) -> Ints:
-    """The index (f,) of the joint that rotates around the time of each frame while all other bones are at rest; -1 for none."""
+    """The index (f,) of the joint that rotates just before or after each frame while all other bones are at rest; -1 for none."""
     poses = np.array([[bone.pose(number) for bone in context.bones] for number in numbers])
     names, which = [bone.name for bone in context.bones], np.full(len(numbers), -1)
     for i, joint in enumerate(joints):
@@ -70,7 +70,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """A ``frame`` and the up to two others nearest in time, all at different angles, on a part of the path that turns one way."""
+    """A ``frame`` and up to two others, the nearest in time, all at different angles, in a part of the motion in one direction."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:

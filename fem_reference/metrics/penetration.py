@@ -34,7 +34,7 @@ OF, AGAINST = "surface", "itself"
 
 # A triangle is small enough to follow a bone with edges up to this many times the reach of ``Exemption``.
 _FOLLOWS = 4.0
-# A point deeper than this share of the half thickness is in the middle of a bone, and may come out on the other side.
+# A point deeper than this share of half the thickness is in the middle of a bone, and may leave it on the other side.
 _MIDDLE = 0.75
 
 _value = attrgetter("value")
@@ -52,11 +52,11 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
     bones, without the part nearest to the exempt surface; 0 where nothing is inside.
 
-    Depth is measured at the vertices of the surface, and between them in triangles that do not follow the bone; where the inside
-    of the muscle reaches the middle of the bone, it is the depth of the inside. Near an attachment only depth added since rest
+    Depth is measured at the vertices of the surface, and between them in triangles that do not follow the bone. Where the interior
+    of the muscle reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest
     counts. The same holds for an attachment inside a bone that moves differently from its own; inside its own bone depth is
     not checked. A triangle follows a bone where all its corners are within the reach of ``Exemption`` and its edges are shorter
-    than four times that: any greater depth between them is the part of a round bone that a flat triangle cuts off.
+    than four times that reach: any greater depth between them is the part of a round bone that a flat triangle cuts off.
 
     Depth is as exact as the field of the bone (``Grid.mean_error``, with rounding). Volume is counted at random points, see
     ``shared``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with fifty times the points,
@@ -103,7 +103,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
 
 
 def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed: Floats) -> _Worst:
-    """The greatest depth beyond the ``allowed`` (k,) one at the points of a surface in pieces, with ``gaps`` (k,) to a bone."""
+    """The greatest depth beyond the ``allowed`` (k,) one at the points of a divided surface, which has ``gaps`` (k,) to a bone."""
     corners, reach = exempt.corners, exempt.reach
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])
@@ -119,8 +119,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: 0 where contact acts, the depth at
-    rest near attachments, any on attachments to this bone or to one that moves like it at all frame ``numbers``.
+    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone: 0 where contact acts, the depth at rest near
+    attachments, and any depth on attachments to this bone or to one that moves like it at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points

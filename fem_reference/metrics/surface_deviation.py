@@ -41,7 +41,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
     Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to
     the closest point of the other, over both directions. Only vertices are sampled, so ``hausdorff`` is a lower bound of the
-    Hausdorff distance. Each also as ``..._percent`` of the reference's greatest displacement.
+    Hausdorff distance. Each is also given as ``..._percent`` of the reference's greatest displacement.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
     geometric = np.array([_both_directions(run, reference, frame) for frame in range(len(reference.positions))])
@@ -75,7 +75,7 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, 0 where a value is 0, else infinite."""
+    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; where the travel is 0, 0 for a value of 0 and infinite for others."""
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)

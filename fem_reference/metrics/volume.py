@@ -6,8 +6,8 @@ from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.metrics import Measure, MeasurementContext, Shown, Statistic, measures
 from fem_reference.runs.store import Run
 
-_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # where the volume is the first
-# The volume is nearly constant: as at the worst place, its error says little of the order with which others fall.
+_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # places where the volume comes first
+# The volume is nearly constant, so its error tells little about the order: it counts with that of the worst place.
 STATISTICS = {
     "deviation": Statistic(
         "%",

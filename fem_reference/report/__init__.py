@@ -7,13 +7,13 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.report.pages import Page, write
 from fem_reference.report.tables import summary
 
-NAME = "report"  # of the page of a comparison, which has a folder of its own
+NAME = "report"  # the name of the page of a comparison, which has a folder of its own
 __all__ = ["NAME", "Page", "of_comparison", "summary", "write"]
 
 
 def of_comparison(comparison: Comparison) -> Page:
     """The page of a comparison of any kind; its numbers are ``measures.json`` and ``measures.csv``."""
-    from fem_reference.report import comparison_page, field_page  # they load matplotlib, which most verbs do without
+    from fem_reference.report import comparison_page, field_page  # these load matplotlib, which most verbs do not need
 
     of_field = "field" in comparison.reference.carries
     return field_page.comparison_page(comparison) if of_field else comparison_page.page(comparison)

@@ -26,9 +26,9 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case of that ``setup``."""
     current = versions.current
-    # Pictures of the frame with the greatest change: before, now, and the change, in one colour scale; or the missing software.
+    # Pictures of the frame with the greatest change: before, now, and the change, on one colour scale; or the missing software.
     run, found = current.candidate, versions.place
-    known = [one for one in versions.changes if one.word != "no number"]  # those that changed most first
+    known = [one for one in versions.changes if one.word != "no number"]  # the greatest changes first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
     contents = {
         "versions": versions,
@@ -51,12 +51,12 @@ def page(versions: Versions, setup: Setup) -> Page:
 
 
 def headline(versions: Versions) -> str:
-    """The number of statistics of each word."""
+    """The number of statistics with each verdict."""
     return ", ".join(f"{versions.count(word)} {word}" for word in ORDER if versions.count(word))
 
 
 def word(versions: Versions) -> str:
-    """The verdict of the headline: worse where anything is, else mixed, else better."""
+    """The verdict of the headline: worse where any statistic is worse, else mixed, else better."""
     return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
 
 
@@ -71,7 +71,7 @@ def sentence(one: Change) -> str:
 
 
 def _by(one: Change, k: int) -> str:
-    """The change of a statistic in the k-th frame, nearer to the reference or further away."""
+    """The change of a statistic in the k-th frame, as words: nearer to the reference or further from it, and by how much."""
     by = float(one.further[k])
     return f"{number(abs(by))} {_unit(one)} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
 
@@ -92,7 +92,7 @@ def place(versions: Versions) -> str:
 
 
 def facts(versions: Versions) -> dict[str, Any]:
-    """All of it as valid JSON: a number that is not finite is None."""
+    """The contents of the page as valid JSON: a number that is not finite is None."""
     rows = [
         {"statistic": one.name, "unit": one.unit, "word": one.word, "frame": one.frame}
         | {"was": one.was[one.at], "now": one.now[one.at], "further": one.by, "error_bar": one.bar}
@@ -140,7 +140,7 @@ def _moved(versions: Versions) -> Drawing | None:
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:
-    """The i-th frame with its change, before and now; without those that are not a number somewhere."""
+    """Shots of the i-th frame: its change, before and now; a shot with a coordinate that is not a number is left out."""
     current = versions.current
     points, frame, truth = current.points[i], current.candidate.numbers[i], current.reference.positions[i]
     before = versions.before
@@ -156,7 +156,7 @@ def _shots(versions: Versions, i: int) -> list[Shot]:
 
 
 def _everywhere(versions: Versions, i: int) -> Floats:
-    """The distance of every vertex (n,) [mm] from its earlier position; if only some are known, that of the nearest one."""
+    """The distance (n,) [mm] of each vertex from its earlier position; where that is unknown, the distance of the nearest other."""
     if versions.before is not None:
         return np.asarray(versions.moved[i])
     rest = versions.current.rest

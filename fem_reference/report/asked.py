@@ -15,7 +15,7 @@ from fem_reference.report.pages import Page, PageHead
 log = logging.getLogger(__name__)
 
 LONGEST = 100  # characters of the name of a page
-INDEX = "index"  # the name of its page, and its kind
+INDEX = "index"  # the name of the page of the index, and its kind
 # Names under which other HTML files in subfolders are listed too.
 _OTHERS = ("report.html", "index.html")
 
@@ -73,7 +73,7 @@ def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> 
     notes = [note] if note else []
     try:
         write_index(folder)
-    except OSError as error:  # the page is written, and matters more than its index
+    except OSError as error:  # the page, which matters more than the index, has been written
         notes.append(f"no index: {error}")
     return path, [f"page: {path}", *(f"  {line}" for line in notes)]
 
@@ -93,7 +93,7 @@ def write_index(folder: Path) -> None:
     path = folder / f"{INDEX}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != INDEX):
-        log.info("no index: %s is no index of fem_reference, and is kept", path)
+        log.info("no index was written: %s is not an index by fem_reference, and is kept", path)
         return
     pages.write(index(*entries_of(folder)), folder, INDEX)
 

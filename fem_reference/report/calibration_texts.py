@@ -3,7 +3,7 @@
 from fem_reference.assessment.calibration import CONFIDENCE, FOLLOWED, Calibration, Estimate
 from fem_reference.report.words import number
 
-# A scatter below this, in standard deviations of the data, is remarked on.
+# A scatter below this, in standard deviations of the data, gets a remark.
 _LITTLE = 0.5
 
 

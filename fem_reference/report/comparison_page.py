@@ -47,7 +47,7 @@ def _failed(comparison: Comparison) -> str:
     if not len(kept):
         return f"{why} No frame was reached, so nothing could be measured against it."
     if reference.outcome.status == "denied":
-        return f"{why} The measures below are not against a valid truth."
+        return f"{why} The measures below are relative to states that are not a valid truth."
     last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
     return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}; the page covers these."
 

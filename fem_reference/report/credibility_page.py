@@ -22,8 +22,8 @@ GRADES = {
     "indicative": "within the uncertainty of every measurement, but all by one specimen, a quotation, a fit or memory",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
-    "verified only": "the equations are solved right; no measurement of muscle is laid beside it",
-    "not measured": "the data of its experiment is not here",
+    "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
+    "not measured": "the data of its experiment is not installed",
 }
 
 
@@ -107,7 +107,7 @@ def source(experiment: str) -> str:
 
 
 def facts(found: Credibility) -> dict[str, Any]:
-    """All of it as valid JSON."""
+    """The contents of the page as valid JSON."""
     rows = [
         {
             "quantity": row.claim.name,

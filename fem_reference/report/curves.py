@@ -59,7 +59,7 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
     found = {run: measure for run, measure in measures.items() if measure is not None}
     name, over, along, shown = "-".join(key), "frame", np.asarray(numbers, float), np.ones(len(numbers), bool)
     if i is not None:
-        assert isinstance(context, MeasurementContext)  # the kind with joints
+        assert isinstance(context, MeasurementContext)  # only muscles have joints
         joint, shown = context.joints[i], turning(context.joints, context, numbers) == i
         name, over, along = f"{name}-{i}", f"angle of {joint.name} [°]", np.degrees(joint.angles(numbers))
         title = f"{title}, over the angle"

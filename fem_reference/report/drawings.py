@@ -19,8 +19,8 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then Tol's muted colours that resemble none
-# of these; then colours between them. style.css has their variants for dark pages.
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
+# differ from all of these; then colours between them. style.css has variants of all for dark pages.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
     *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
@@ -40,7 +40,7 @@ _OURS = (
     ),
     *("xpbd", "arap", "pbd_program", "arap_volume_step", "line_of_action"),
 )
-# This many lines differ by colour alone; further ones are dashed.
+# The number of lines that differ by colour alone; further ones are dashed.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # nearly black, as matplotlib omits pure black from SVG
@@ -85,7 +85,7 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The i-th colour, that of the reference first, then the palette, then its colours in ever darker shades.
+    """The i-th colour: 0 is that of the reference, then follow the palette and ever darker shades of its colours.
 
     >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
@@ -98,7 +98,7 @@ def colour_of(i: int) -> str:
 
 
 def look_of(i: int) -> dict[str, Any]:
-    """The colour and the dashes of the i-th line, that of the reference first.
+    """The colour and the dashes of the i-th line; line 0 is the reference.
 
     >>> look_of(1), look_of(7)
     ({'color': '#0072b2', 'linestyle': '-'}, {'color': '#882255', 'linestyle': '--'})

@@ -17,7 +17,7 @@ from fem_reference.report.words import duration, listed, number, words
 MAIN = "surface_deviation.rms"
 # The heading of each column of the table, by name.
 HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
-# Changes are drawn down to this factor below the least visible one; smaller ones are drawn there, with their value.
+# The axis ends at this factor below the least change that counts; smaller changes are drawn at its end, with their value.
 _DEPTH = 10.0
 
 
@@ -41,7 +41,7 @@ def page(found: CaseOmissions) -> Page:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """The effects or features left out, in words: "all of them" where that is so."""
+    """The effects or features left out, in words: "all of them" where none remains that could be."""
     if not omission.left_out:
         return "nothing"
     every = {name for one in ablation.omissions for name in one.left_out}

@@ -26,7 +26,7 @@ from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
 _DPI = 150
-_LIGHT = np.array([0.3, 0.45, 0.84])  # towards the light: above the eye, to its right
+_LIGHT = np.array([0.3, 0.45, 0.84])  # the direction towards the light, which is above the eye and to its right
 _LISTING: Any = {"color": "blue", "linewidth": 2, "marker": "o", "markersize": 6, "markerfacecolor": "lime"}
 _MARKERS = "xd+s^v"
 
@@ -107,11 +107,11 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The style of a line: for the listing that of its own ``plot`` command, for others by their index."""
+    """The style of a line: that of the listing's own ``plot`` command for the listing, else by the index of the run."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
-    colour = colour_of(i + 1 if i else 0)  # the first of the palette is like that of the listing
+    colour = colour_of(i + 1 if i else 0)  # colour 1 is left out, as it resembles that of the listing
     return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": marker, "markersize": 3}
 
 
@@ -124,8 +124,8 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
 
 
 def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
-    """The rival, the reference and their difference, each drawn by ``draw`` from values (n,) at the vertices, all values (k, n) on
-    the same scale, and the name of the colour map.
+    """The rival, the reference and their difference. ``draw`` gets the values (n,) at the vertices, all values (k, n) that share
+    their colour scale, and the name of the colour map.
     """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
@@ -204,7 +204,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The whole surface, the belt about its mean height, and the part about its anchors (k, 3)."""
+    """The windows: the whole surface, the belt about its mean height, and the part about its anchors (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
@@ -247,7 +247,7 @@ def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) 
     faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
     faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
     order = np.argsort(corners[:, :, 2].mean(axis=1))
-    # Without an edge of their own colour, the white behind shows between triangles.
+    # Triangles get an edge of their own colour; without it the white background shows between them.
     edges: Any = (0, 0, 0, 0.5) if line else faces[order]
     shown = list(corners[order, :, :2])
     return PolyCollection(shown, facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2)

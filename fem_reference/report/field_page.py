@@ -14,7 +14,7 @@ from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-AGREE = 1e-9  # of the greatest value: a smaller difference is rounding
+AGREE = 1e-9  # a difference below this share of the greatest value is rounding
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
@@ -63,7 +63,7 @@ def apart(example: Comparison) -> str:
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
-        return f"{name} and the equation agree; at the furthest vertex they differ by {number(distance)}."
+        return f"{name} and the equation agree; their greatest difference at a vertex is {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
     compared = (
         f"{number(distance / size)} times the greatest value of the equation's solution"

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 SECONDS = 600  # time limit of the drawing program
-# If a surface is equally wide along two axes, this relative difference, far above round-off, selects the coordinate axes.
+# Principal moments that differ by less than this share, far above round-off, count as equal; then coordinate axes are chosen.
 _TIES = 1e-11
 
 
@@ -114,7 +114,7 @@ def ramp() -> str:
 def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
-    From the first the silhouette is largest; the second is a quarter turn about the long axis from it. Both cameras are on the
+    The first view has the largest silhouette; the second is a quarter turn about the long axis away. Both cameras are on the
     side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
     """
     middle = surface.points.mean(axis=0)

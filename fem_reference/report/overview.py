@@ -15,7 +15,7 @@ from fem_reference.report.tables import exerted, spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
-# The statistics printed for a comparison; the page, JSON and CSV have all.
+# The statistics printed for a comparison; the page, the JSON and the CSV file have all statistics.
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
@@ -106,7 +106,7 @@ def _known(result: Comparison) -> list[str]:
 
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:
-    assert result.error_bars is not None  # the bar is of them
+    assert result.error_bars is not None  # the bar is one of them
     at = f"frame {result.error_bars.numbers[bar.widest]}"
     value = bar.values[bar.widest]
     return (

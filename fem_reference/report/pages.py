@@ -30,8 +30,8 @@ from fem_reference.report.words import duration, listed, number, ratio, title_of
 # Places in the frame of all pages (base.html): of the facts, and of the command that made the page.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
 _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
-_HEAD = 2**17  # bytes of a file within which they are looked for
-_SIDE = 160  # pixels of the thumbnail
+_HEAD = 2**17  # the number of bytes at the beginning of a file within which the facts are looked for
+_SIDE = 160  # the greatest width and height of the thumbnail [pixels]
 _PICTURE = re.compile(r'src="data:image/webp;base64,([A-Za-z0-9+/=]+)"')
 Headlines = tuple[tuple[str, str, str], ...]
 
@@ -61,7 +61,7 @@ class Page:
 @dataclass(frozen=True)
 class PageHead:
     """The facts in the head of a page: those of its ``Page``; the command that ``asked`` for it, empty if a program wrote it; the
-    time when it was ``made``; and the source of a thumbnail (``picture``), if it has any.
+    time when it was ``made``; and the source of its thumbnail (``picture``), empty without one.
     """
 
     kind: str
@@ -117,10 +117,10 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
         numbered = name if i == 1 else f"{name}-{i}"
         path = where(numbered)
         if not path.exists():
-            return numbered, "" if i == 1 else f"{where(name)} is of another command, and stays as it is"
+            return numbered, "" if i == 1 else f"{where(name)} was made by another command, and is kept"
         head = read(path)
         if head is not None and head.asked == asked:
-            return numbered, f"written anew: the same command made this page on {head.made}"
+            return numbered, f"replaces the page that the same command made on {head.made}"
     raise AssertionError("numbers do not end")
 
 

@@ -74,7 +74,7 @@ def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction
 
 
 def _camera(points: NDArray[Any], frame: NDArray[Any], direction: NDArray[Any]) -> dict[str, Any]:
-    """A parallel camera from ``direction`` on the body ``frame``, wide enough for ``points`` unless scattered."""
+    """A parallel camera that looks from ``direction`` at the body ``frame``, wide enough for ``points`` unless they scatter."""
     middle = (frame.max(axis=0) + frame.min(axis=0)) / 2
     own, both = (float(np.linalg.norm(cloud - middle, axis=1).max()) for cloud in (frame, np.vstack([frame, points])))
     up = (0.0, 0.0, 1.0) if abs(direction[2]) < 0.95 else (0.0, 1.0, 0.0)
@@ -85,7 +85,7 @@ def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) ->
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=[SIDE * _OVERSAMPLING] * 2)
-    plotter.render_window.SetMultiSamples(1)  # more take four fifths of the time; oversampling smooths edges as well
+    plotter.render_window.SetMultiSamples(1)  # more take four fifths of the time, and oversampling smooths edges too
     plotter.set_background("white")
     for body, looks in bodies:
         plotter.add_mesh(body, **looks)

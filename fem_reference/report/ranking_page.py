@@ -91,7 +91,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
 
 
 def _drawing(table: Table) -> Drawing:
-    """Deviation of the surface against the time of a frame, of every solver on every scene; legends of colours and of marks."""
+    """Deviation of the surface against the time of a frame, for every solver on every scene; with legends of colours and marks."""
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
     # The reference first.
     colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))

@@ -8,7 +8,7 @@ from fem_reference.assessment.fronts import LOADED
 from fem_reference.assessment.recommendation import Expected, Recommendation
 from fem_reference.report.words import duration, listed, number, title_of, under_load
 
-# Entries of a point's choice that are no settings in a sentence.
+# Entries of a point's choice that a sentence does not list among the settings.
 _UNSAID = ("solver", "scene", "name", "program")
 
 
@@ -50,7 +50,7 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
     if not found.measured:
         margins = found.margins
         lines.append(
-            f"margins included: {number(margins.error)} times the error, {number(margins.time)} times the time"
+            f"including margins: {number(margins.error)} times the error, {number(margins.time)} times the time"
         )
     if warning := under_load(found.loads, LOADED):
         own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
 from fem_reference.io.texts import finite
 
-# The greatest number of judgements in a text; the others are only counted.
+# The greatest number of judgements listed in a text; further ones are only counted.
 MOST_ROWS = 15
 _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
@@ -45,7 +45,8 @@ def text(check: Check) -> str:
     lines += _notes(check)
     if _of(check, "fail"):
         lines.append(
-            f"to see which statistics are nearer or further away: compare {check.case} --candidate ... --against the baseline"
+            "to see which statistics moved nearer to the reference or further from it, run: "
+            f"./fem compare {check.case} --candidate ... --against BASELINE"
         )
     lines += [f"{check.candidate} on {check.case}:", *(f"  {line}" for line in _answers(check))]
     return "\n".join([*lines, f"verdict: {check.word}"])
@@ -65,8 +66,8 @@ def markdown(check: Check) -> str:
 
 
 def junit(check: Check, seconds: float) -> str:
-    """One suite for the candidate, one test case for each judgement, skipped if inconclusive. ``seconds``: the time of the check.
-    The verdict and the doubts about the reference are properties: a doubtful pass is no failure.
+    """A suite for the candidate, with a test case for each judgement, skipped if inconclusive. ``seconds``: the time of the check.
+    The verdict and the doubts about the reference are properties of the suite: a doubtful pass is no failure.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
@@ -89,7 +90,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a Markdown text, that state ``why`` nothing was judged and replace older files."""
+    """A JUnit suite with one error, and a Markdown text, to replace older files; both state ``why`` nothing was judged."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})

@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the quantities that they match.
+# The statistic in the tables, and the quantities at equal values of which they compare solvers.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -105,14 +105,14 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
         verb = "costs" if one.is_measured else "would cost"
         return f"To halve the error of {one.solver} {verb} {number(one.factor)} times the time ({reach})."
     if one.count > 1:
-        return f"More time hardly makes {one.solver} better ({reach})."
-    return f"Of {one.solver} one setting is both the fastest and the nearest: {best} with {label}, {time} a frame."
+        return f"More time hardly improves {one.solver} ({reach})."
+    return f"One setting of {one.solver} is the fastest and the most accurate: {best} with {label}, {time} a frame."
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
     """Tables at the same time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
-    # An error "at most" means the same here as in the verb recommend.
+    # An error of "at most" a value includes the bar of the truth, as in the verb recommend.
     asked.append((case.certain, TIME, error, TIME))
     return [
         (

@@ -19,7 +19,7 @@ from fem_reference.scenes.case import Case
 
 MEASURES = "measures"  # the name of the files
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
-# The columns of the first table: metric, statistic, headings of the group and the column, unit.
+# The columns of the first table: metric, statistic, heading of the group, heading of the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.

@@ -12,7 +12,7 @@ from fem_reference.report.drawings import REFERENCE, Drawing, drawn, looks, over
 from fem_reference.report.pages import Page
 from fem_reference.report.words import listed, number
 
-# Room for lines of candidates beyond a band, in heights of the band.
+# Room above and below a band for the lines of candidates, in heights of the band.
 _BEYOND = 1.5
 _SHADE, _FIRST, _TOTAL = "#888888", "#0072b2", "#56b4e9"
 
@@ -38,7 +38,7 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface, the bar of the reference, the main cause, and the candidates' places."""
+    """The result in sentences: the band of the surface, the bar of the reference, the main cause, and each candidate's verdict."""
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]

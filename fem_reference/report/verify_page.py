@@ -21,7 +21,7 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = 1e-8, 1e3  # shares of the tolerance that the overview can show; others are drawn at its edge
+LEAST, GREATEST = 1e-8, 1e3  # the range of shares of the tolerance in the overview; others are drawn at its edge
 _ROW = 0.175  # height of a row of the overview [in]
 
 
@@ -123,7 +123,7 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
-    """Draw a result at its share; a hollow triangle at the edge if it is beyond, a cross if it is not a number."""
+    """Draw a result at its share of the tolerance: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
     low, high = limits
     value = share(one)
     look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}
@@ -168,7 +168,7 @@ def drawable(one: Result) -> bool:
 
 
 def convergence(one: Result) -> Drawing:
-    """Error over mesh size on logarithmic axes, beside a line with the integer slope nearest to its order."""
+    """Error over mesh size on logarithmic axes, beside a line whose slope is the integer nearest to the measured order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

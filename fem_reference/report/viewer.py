@@ -3,15 +3,15 @@
 ``viewer.js`` unpacks one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
 
     library    text of each file of three.js
-    frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: of magnitudes, of signed values,
-               and of fibres
+    frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: for magnitudes, for signed values
+               and for fibres
     low, step  position = low + step * whole number from 0 to 65535 [mm]
     triangles  whole numbers (m, 3), of 4 bytes, the same for every run
     runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): number of
                vertices outside the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the previous
                frame, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
-    force      the greatest force drawn [N];  attached  the vertices that are attached to bones
+    force      the greatest force drawn [N];  attached  numbers of the vertices attached to bones
     and, as described in ``viewer_fields``: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
@@ -38,7 +38,7 @@ from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
-# Bytes of positions and levels of all frames before compression: about as many as base64 needs after it.
+# The most bytes of positions and levels of all frames before compression; compressed and in base64 they take about as many.
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
@@ -77,7 +77,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
     data, card = _data(comparison, shown, every), tomllib.loads((THREE / "card.toml").read_text(encoding="utf-8"))
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return {
-        "data": text.replace("<", "\\u003c"),  # no name in it ends the script
+        "data": text.replace("<", "\\u003c"),  # so that no name in it can end the script
         "candidates": [run.name for run in shown[1:]],
         "quantities": [one["name"] for one in data["quantities"]],
         "numbers": data["frames"],
@@ -100,7 +100,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     frames = {run.name: _frames(run, numbers) for run in shown}
     own = np.concatenate(
         [reference.surface.points[None], frames[reference.name]]
-    )  # not empty without any reached frame
+    )  # not empty even if no frame was reached
     box = _box(own, list(frames.values()))
     fields = Fields(comparison, shown, numbers)
     runs, top = _runs(frames, reference.name, box)
@@ -136,7 +136,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """The places on a scale [%] of its ends, and of rest unless that is near an end."""
+    """The places on a scale [%] that get a label: its ends, and rest unless it is near an end."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -146,7 +146,7 @@ def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
 def _every(shown: list[Run], budget: int) -> int:
     """The stride of frames that keeps the positions of all runs within ``budget`` bytes, but leaves two frames."""
     count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
-    frame = len(shown) * vertices * (3 * 2 + 2)  # positions of two bytes, and two quantities of one
+    frame = len(shown) * vertices * (3 * 2 + 2)  # a vertex: three coordinates of two bytes, two quantities of one byte
     strides = range(1, max(count, 2))
     return next((every for every in strides if -(-count // every) * frame <= budget), strides[-1])
 
@@ -158,7 +158,7 @@ def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames, which exceeds the reference's by at most its length on each side, as a run may scatter."""
+    """The box around all frames, cut off at one length of the reference's box beyond it on each side, as a run may scatter."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
@@ -196,7 +196,7 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[di
 
 
 def _last_finite(frames: Floats) -> Floats:
-    """The frames, with the last reached one in place of one that was not reached, which then costs no bytes."""
+    """The frames, with each that was not reached replaced by the last reached one before it, so that it costs no bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
     return np.asarray(frames[last])

@@ -1,4 +1,4 @@
-"""Colours of surfaces and of fibres in the 3D view, beside the distance to the same vertex, packed into few bytes.
+"""Quantities that colour surfaces and fibres in the 3D view, in addition to the distance to the same vertex, in few bytes.
 
 quantities  name, signed, and top, the greatest magnitude [mm]: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the greatest magnitude by
@@ -32,7 +32,7 @@ from fem_reference.runs.store import Run, at_numbers
 FIBRES, POINTS = 30, 12  # greatest number of fibres drawn, and of points of each
 NEAR = 0.2  # distance [mm] within which a vertex touches a bone
 _LEVELS = 127
-# The statistic of the surface's deviation that is the maximum of a quantity.
+# For each quantity, the statistic of the surface's deviation that is its maximum.
 _BARS = {"distance": "max", "surface": "hausdorff"}
 _FAR = 1e6  # distance [mm] beyond which a fibre counts as not known
 
@@ -98,7 +98,7 @@ class Fields:
         return {name: values for name, values in found.items() if values}
 
     def quantities(self) -> list[dict[str, Any]]:
-        """The quantities that can be chosen, beside the distance, which follows from the positions."""
+        """The quantities that can be chosen, besides the distance to the same vertex, which follows from the positions."""
         return [
             {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
             for name, values in self.surfaces.items()
@@ -136,7 +136,7 @@ class Fields:
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
         """The lines, and the least and greatest stretch of a piece of these at ``points`` (f, m, 3) [mm] of each run."""
         lines, ends = self.lines[0], self.lines[0].offsets
-        # Pieces go from each point of a line to the next.
+        # A piece joins a point of a line to the next one.
         inside = np.delete(np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1)
 
         def lengths(places: Floats) -> Floats:

@@ -43,8 +43,8 @@ def duration(seconds: float | None) -> str:
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning where other processes kept more than a share of ``most`` of the machine busy while times were measured; NaN: an
-    unknown share.
+    """A warning where other processes kept more than the share ``most`` of the machine busy while times were measured; a share of
+    NaN is unknown.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'

@@ -71,13 +71,13 @@ class Contents(Record):
 
 
 def frame_file(number: float, suffix: str) -> str:
-    """The name of a file of the frame of a ``number``; ValueError where that is not whole, as two frames would share a file.
+    """The name of a file of the frame with a ``number``; ValueError where it is not whole, as two frames would share a file.
 
     >>> frame_file(10, ".vtp")
     'frame_0010.vtp'
     """
     if number % 1:
-        raise ValueError(f"frame {number:g}, which is no whole number, has no file")
+        raise ValueError(f"frame {number:g} has no file, as its number is not whole")
     return f"frame_{number:04.0f}{suffix}"
 
 
@@ -107,7 +107,7 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
         known = ", ".join(vector_names(scalars, kind))
-        want = f"one of {known}" if known else "a run of the reference: no force is known"
+        want = f"one of {known}" if known else "a run of the reference: this run has no forces"
         raise InputError("bone", f'"{name}"', want)
     return np.stack([scalars[key] for key in keys], axis=1)
 

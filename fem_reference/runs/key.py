@@ -14,7 +14,7 @@ from fem_reference.foundations import version
 from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
-# An import as a formatter leaves it, over several lines within brackets. To parse these alone takes a sixth of the time.
+# An import as a formatter writes it, over several lines only in brackets. Parsing imports alone takes a sixth of the time.
 _IMPORT = re.compile(rb"^[ \t]*((?:from [\w.]+ )?import (?:\([^)]*\)|[^\n(]+))", re.MULTILINE)
 # Code that makes problems from scenes determines every run; some of it is found by name at run time, not by imports.
 _BEFORE = ("foundations", "io", "effects", "geometry", "scenes", "problems")
@@ -32,7 +32,7 @@ _MADE_WITH = (
 
 
 def key(scene: str, solver: str, settings: Mapping[str, object]) -> str:
-    """A hash of 16 digits over the key of a ``scene``, the ``solver``, those ``settings`` that matter, and :func:`code_hash`."""
+    """A hash of 16 digits over the key of a ``scene``, the ``solver``, ``settings`` that change results, and :func:`code_hash`."""
     parts = [scene, solver, json.dumps(settings, sort_keys=True), code_hash(solver)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
@@ -48,7 +48,7 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files that determine the runs of ``solver``: packages that make problems, and its modules with all that they import."""
+    """The files that determine the runs of ``solver``: packages that make problems, and its own modules with all their imports."""
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
     while waiting:
@@ -76,7 +76,7 @@ def imported(path: Path, package: Path) -> tuple[str, ...]:
 
 
 def _tree(source: bytes) -> ast.AST:
-    """The imports of a ``source``; the whole of it where a text that looks like an import is not one."""
+    """The syntax tree of the imports of a ``source``; of all of it where a text that looks like an import is not one."""
     try:
         return ast.parse(b"\n".join(_IMPORT.findall(source)))
     except SyntaxError:
@@ -89,7 +89,7 @@ def machine() -> str:
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of a measurement: our version, the machine, the ``manner`` of running on it, and the versions of packages."""
+    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs used it, and versions of packages."""
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 
@@ -104,8 +104,8 @@ def _files(folder: Path) -> set[Path]:
 
 
 def _module(package: Path, parts: list[str]) -> set[Path]:
-    """The files of the module ``parts`` below ``package``, and of the packages around it but the first, which only lists public
-    names; for a solver in a folder, the whole folder. Empty where there is no such module.
+    """The files of the module ``parts`` below ``package``, and of the packages around it except the outermost, which only lists
+    public names; for a solver in a folder, the whole folder. Empty where there is no such module.
     """
     place = package.joinpath(*parts)
     if place.is_dir():

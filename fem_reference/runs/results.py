@@ -62,7 +62,7 @@ class Results:
         return tuple(self.states)
 
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
-        """Results by name at ``points`` (n, 3) [mm] of the rest state, at a frame number of ``frames``.
+        """Results by name at ``points`` (n, 3) [mm] of the rest state, at one of the frame numbers ``frames``.
 
         ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
         ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume
@@ -100,8 +100,8 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy [N mm] of each effect that has one, by its name in scene files, at a frame number of ``frames``: by virtual
-        work, minus its slope in the angle of a joint is its share of the moment. Contact and springs are not among them.
+        """The energy [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. By
+        virtual work, its share of a moment is minus the slope of its energy in the angle. Contact and springs are left out.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -127,7 +127,7 @@ class Results:
         there = self.names(state)
         for name in names or ():
             if name not in there:
-                raise InputError("names", f'"{name}"', f"one of {', '.join(there)}, which this run has")
+                raise InputError("names", f'"{name}"', f"one of the results of this run: {', '.join(there)}")
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:
@@ -221,7 +221,7 @@ class _Places:
         return np.asarray(stress)
 
     def energies(self, acting: Sequence[tuple[Effect, float]]) -> Iterator[tuple[str, Floats]]:
-        """The name of each effect with an energy, and that per rest volume (n,) [MPa]."""
+        """The name of each effect with an energy, and its energy per rest volume (n,) [MPa]."""
         with np.errstate(all="ignore"):  # where det F is not positive
             now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
             for effect, amount in acting:
@@ -293,7 +293,7 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
     i, j = (
         near.argmax(axis=1),
         3 - near[:, ::-1].argmax(axis=1),
-    )  # the corners around each node; at a corner, that one twice
+    )  # the two corners that each node is between; for a corner, itself twice
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]
     slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])

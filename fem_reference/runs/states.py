@@ -132,7 +132,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays ``names``, by default all, of an .npz file, and those of ``also`` that exist; InputError where it is damaged."""
+    """The arrays ``names`` (by default all) of an .npz file, and those of ``also`` that exist; InputError where it is damaged."""
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:
@@ -168,7 +168,7 @@ def write_field(path: Path, field: NodalField) -> None:
 
 
 def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, Floats]]:
-    """The mesh, and by name the arrays (f, ...) of the frames, of the run in ``folder``; InputError where a file is damaged."""
+    """The mesh of the run in ``folder``, and by name its arrays (f, ...) over frames; InputError where a file is damaged."""
     frames = []
     for number in numbers:
         path = folder / FIELD / frame_file(number, ".npz")
@@ -202,4 +202,4 @@ def _check_field(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> N
         raise InputError(path, got, want)
     nodes = {len(points), len(points) + len(FieldMesh(points, cells).edges)}
     if len(values) not in nodes or any(len(array) < len(points) for name, array in arrays.items() if name != "cells"):
-        raise InputError(path, f"{len(values)} values", f"{' or '.join(map(str, sorted(nodes)))}, one a node")
+        raise InputError(path, f"{len(values)} values", f"{' or '.join(map(str, sorted(nodes)))}, one for each node")

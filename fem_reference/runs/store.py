@@ -38,10 +38,10 @@ class Frame:
     """One requested frame, by its ``number``, with the parts that the solver has.
 
     ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the surface's vertices, of the fibres' points
-    and, (0, 3) without cells, of the mesh's nodes. ``forces`` (3,) [N] by name of each constraint, along its prescribed
-    components, and their ``moments`` (3,) [N mm] about the origin (at nodes of several regions that prescribe the same component,
-    the force counts in each); also those of obstacles. ``state``: the unknowns of the cells, where requested. ``field``: of a
-    scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
+    and of the mesh's nodes, (0, 3) without cells. ``forces`` (3,) [N] by name of each constraint, along its prescribed
+    components, and their ``moments`` (3,) [N mm] about the origin (where several regions prescribe the same component at a node,
+    each of them counts its force); also those of obstacles. ``state``: the unknowns of the cells, where requested. ``field``: that
+    of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
     ``note``: the text that progress shows for the frame.
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm],
@@ -168,7 +168,7 @@ class Run:
 
 
 def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:
-    """The run in memory with ``frames``; its arrays are those that all frames have. ``rest``: the shapes that they move."""
+    """The run in memory with ``frames``; its arrays are those that all frames have. ``rest``: the shapes at rest."""
     states = tuple(frames)
 
     def stacked(name: str) -> Floats | None:
@@ -197,7 +197,7 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
 
 
 def load(folder: Path) -> Run:
-    """The run in ``folder``; InputError where there is none, it was cut off, or one of its files is damaged."""
+    """The run in ``folder``; InputError where there is no run, it was cut off, or one of its files is damaged."""
     place = folder / "run.json"
     state = texts.read_json(place, "the run.json of a stored run")
     if isinstance(state, dict) and state.get("status") == "running":
@@ -238,7 +238,7 @@ def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floa
     """Raise InputError where a frame has another number of points than the run at rest."""
     for name, points in zip(names, frames, strict=True):
         if len(points) != len(rest):
-            raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as in the rest of the run")
+            raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as in the rest state of the run")
 
 
 def status(folder: Path) -> str:

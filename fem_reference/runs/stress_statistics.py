@@ -5,18 +5,18 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, tet_volumes
 from fem_reference.runs.results import Results
 
-# Statistics by kind of stress. No greatest value: at the rim of an attachment it grows without bound with smaller tetrahedra.
+# Statistics by kind of stress; no maximum, which grows without bound at the rim of an attachment as tetrahedra get smaller.
 STATISTICS = {"along_fibres": ("mean", "p95"), "von_mises": ("mean", "p95"), "pressure": ("mean", "p05", "p95")}
-_MOST = 8192  # tetrahedra that are evaluated, evenly spread
-# Barycentric coordinates of four points, of equal shares of the volume: exact to degree 2 (Hammer and Stroud 1956).
+_MOST = 8192  # the most tetrahedra that are evaluated, evenly spread
+# Barycentric coordinates of four points with equal weights: exact to degree 2 (Hammer and Stroud 1956).
 _NEAR = (5 - 5**0.5) / 20
 _POINTS = np.full((4, 4), _NEAR) + (1 - 4 * _NEAR) * np.eye(4)
 
 
 def stress_scalars(results: Results, frame: float) -> dict[str, float]:
     """The mean and quantiles [MPa] over the volume at rest by name, such as ``stress_von_mises_p95``, which 95 % of the volume do
-    not exceed. The Cauchy stress at four points of each tetrahedron gives its part along the fibres, where they are known, the von
-    Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN where a tetrahedron is inside out.
+    not exceed. The Cauchy stress is taken at four points of each tetrahedron: its component along the fibres, where these are
+    known, the von Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN where a tetrahedron is inside out.
     """
     mesh = results.mesh
     tets = np.unique(np.linspace(0, len(mesh.tets) - 1, _MOST).astype(int))

@@ -25,7 +25,7 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` of several muscles for one of them; a force of one of the ``others`` on it has the other's name."""
+    """The part of a ``frame`` of several muscles for one of them; a force on it by one of the ``others`` has the other's name."""
     assert frame.surface is not None  # of the reference
     assert frame.fibres is not None
     forces, moments = (
@@ -61,7 +61,7 @@ def _own(key: str, name: str, others: tuple[str, ...]) -> str:
 
 
 def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The ``runs`` of muscles by name, with the same frames, each with the others as ``others``."""
+    """The ``runs`` of muscles by name, which have the same frames; each gets the other runs as its ``others``."""
     return {
         name: replace(run, others={other: one for other, one in runs.items() if other != name})
         for name, run in runs.items()

@@ -26,13 +26,13 @@ from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
 
 RESTART = "restart"
-# Statuses of a solve that was killed: with the process that stores it, or alone, for example for lack of memory or disk space.
+# Statuses of a solve that was killed, alone or with the process that stores it, for example for lack of memory or disk space.
 ENDED_EARLY = ("running", "crashed")
 
 
 @dataclass(frozen=True)
 class CutOff:
-    """The kept part of a run: the ``numbers`` of its frames, and the ``folder`` for its solver until it ends."""
+    """The kept part of a run that was cut off: the ``numbers`` of its frames, and the ``folder`` of its solver's own files."""
 
     folder: Path
     numbers: tuple[int, ...]
@@ -115,7 +115,7 @@ class Writer:
 
     @property
     def cut_off(self) -> CutOff:
-        """The stored part, for a solver that can continue."""
+        """The stored part of the run, for a solver that can continue it."""
         return CutOff(self.folder / RESTART, self.frames)
 
     @property
@@ -167,7 +167,7 @@ class Writer:
             clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
-        """The unknowns of the tets, if the frame has them."""
+        """Write the unknowns of the tets; False where the frame has none."""
         if self.rest.mesh is None or frame.state is None:
             return False
         if not self.frames:

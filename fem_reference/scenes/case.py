@@ -20,10 +20,10 @@ from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-# Further folders, separated as in PATH, that scene files may read files from.
+# The setting with further folders, separated as in PATH, from which scene files may read files.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
-COMMAND = "command"  # the solver that runs a program, which a scene file cannot choose
-DELAUNAY = "delaunay"  # in place of the name of a file of triangles
+COMMAND = "command"  # the solver that runs a program; a scene file cannot choose it
+DELAUNAY = "delaunay"  # the word that stands in place of the name of a file of triangles
 # Settings of solvers that change the time and not the answer.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
@@ -85,10 +85,10 @@ class NegativeControl(Record):
 
 
 class Case(Record):
-    """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
-    messages, ``from_file`` says that it has one. ``quick`` are changes, by key, with which it is solved faster and less accurately,
-    as in tests; ``unsolved`` says why the reference ends before the last frame, where it does. ``decisions`` say why, where the
-    case itself determined which effects it needs.
+    """A case, read and checked: the keys of its file, its ``name`` and its ``folder``. ``place`` names its file in messages;
+    ``from_file``: True where it has a file. ``quick``: changes by key with which it is solved faster and less accurately, as in
+    tests. ``unsolved``: why the reference ends before the last frame, if it does. ``decisions``: with ``effects = "auto"``, for
+    each effect of the file whether the case needs it, and why.
     """
 
     title: str
@@ -137,7 +137,7 @@ class Case(Record):
         raise NotImplementedError(f"{type(self).__name__} has no frames")
 
     def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
-        """Standards that a run is measured against, ``of`` a candidate or the ``"reference"``."""
+        """The standards against which a run ``of`` a candidate or of the ``"reference"`` is measured."""
         return frozenset({"reference", "itself"})
 
     @property
@@ -155,7 +155,7 @@ class Case(Record):
 
     @property
     def needed_data(self) -> list[str]:
-        """The files below the data folder that its solution is determined by."""
+        """The files below the data folder that determine its solution."""
         known = json.dumps(self.model_dump(mode="json", include=set(self.determined_by)))
         return sorted(set(re.findall(r'"data:([^"]+)"', known)))
 
@@ -197,7 +197,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Causes of verdicts: what determines solutions, and the judged solvers with the settings that matter."""
+        """Everything that decides verdicts: what determines solutions, and the judged solvers with settings that change results."""
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [
@@ -229,12 +229,12 @@ def _exists(path: Path) -> bool:
     """True where there is such a file or folder; False also for text that cannot be a path."""
     try:
         return path.exists()
-    except (OSError, ValueError):  # a name that is too long, or with a null character
+    except (OSError, ValueError):  # a name that is too long or contains a null character
         return False
 
 
 def _unnamed(tables: Any, names: Collection[str]) -> Any:
-    """The ``tables`` with only the suffix of each file name, which says how the file is read."""
+    """The ``tables`` with each file name reduced to its suffix, which determines how the file is read."""
     if isinstance(tables, dict):
         files = {name for name, text in tables.items() if name in names and isinstance(text, str) and text != DELAUNAY}
         return {name: Path(value).suffix if name in files else _unnamed(value, names) for name, value in tables.items()}

@@ -25,7 +25,7 @@ def cases() -> list[str]:
 
 
 def read(case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None) -> Case:
-    """A shipped case by name, or the case of a folder or of a file; one with a ``domain`` is of a scalar field.
+    """A shipped case by name, or the case in a folder or a file; a case with a ``domain`` is of a scalar field.
 
     ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values. ``with_negative_control`` applies the
     negative control, which is checked in any case, except after changes of other keys.
@@ -45,11 +45,11 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
 
 
 def _scene_file(case: str | Path) -> Path:
-    plain = Path(case).name == str(case)  # else it is a path and not a name
+    plain = Path(case).name == str(case)  # True for a name, False for a path
     shipped = [HOME / "cases" / str(case) / "case.toml"] if plain else []
     found = list[Path]()
     for path in (*shipped, Path(case) / "case.toml", Path(case)):
-        with suppress(OSError, ValueError):  # a name that is too long, or with a null character
+        with suppress(OSError, ValueError):  # a name that is too long or contains a null character
             if path.is_file():
                 found.append(path.resolve())
     if plain and len(set(found)) > 1:
@@ -68,7 +68,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
         for part in parents:
             inside = inside[part]
         if not (add and last and isinstance(inside, dict)):
-            inside[last]  # a change replaces an existing value
+            inside[last]  # an error where there is no value to change
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         want = f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}"
@@ -113,7 +113,7 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself, where it is one of a muscle; else InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself if it is one of a muscle; else InputError at ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")
@@ -208,7 +208,7 @@ def _checked[C: Case](case: C) -> C:
 
 
 def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The effects of a ``kind`` below the key ``effect``, each once; other values than lists unchanged."""
+    """The effects of a ``kind`` below the key ``effect``, each once; a value that is not a list is returned unchanged."""
     if not isinstance(entries, list | tuple):
         return entries
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
@@ -218,8 +218,8 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """Check that an effect acts once in each region (two of a name would share their unknowns), a load once on each part of the
-    surface, and that no bulk modulus is below the shear modulus there: no tissue has one, it is usually a mistake in units.
+    """Check that an effect acts once in each region (two of one name would share their unknowns), a load once on each part of the
+    surface, and that no bulk modulus is below the shear modulus of its region: that is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
@@ -244,7 +244,7 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
 
 
 def _check_muscles(case: MusclesCase) -> None:
-    """Check that each muscle has its own name, that effects on all muscles are given for all, and that each alone is valid."""
+    """Check that each muscle has its own name, that effects on all muscles are stated for all, and that each muscle is valid."""
     check_acting(case.effect, [bone.name for bone in case.bone], case.frames, case.place)
     others = [bone.name for bone in case.bone]
     others += [one.name for muscle in case.muscle for one in muscle.attachment]

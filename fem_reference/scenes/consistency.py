@@ -1,4 +1,4 @@
-"""Checks of a muscle's case beyond those of its keys: names are unique and refer to something, and it rests at first."""
+"""Checks of a muscle's case across its keys: names are unique and refer to something, and the muscle is at rest at first."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from fem_reference.foundations.records import Record, check_once, check_used, jo
 from fem_reference.scenes import regions
 from fem_reference.scenes.muscle import Frames, MuscleCase
 
-# What a load acts on, where it is no attachment: the surface that is not attached to bone.
+# The name of the surface on which a load acts if not on an attachment: the part that is not attached to bone.
 FREE = "free"
-# The stretch of fibres of the given length, but for a little.
+# The stretch of fibres slightly beyond their given length.
 _GIVEN = 1 - 1e-5
 
 
@@ -44,7 +44,7 @@ def _check_loads(case: MuscleCase) -> None:
 
 
 def _check_forces(case: MuscleCase) -> None:
-    """Check that names of forces are distinct and that something keeps the muscle from drifting."""
+    """Check that the names of forces are distinct, and that an attachment or an effect keeps the muscle from drifting."""
     bones = [bone.name for bone in case.bone]
     contact = among(case.effects) is not None
     for i, attachment in enumerate(case.attachment):
@@ -58,8 +58,8 @@ def _check_forces(case: MuscleCase) -> None:
 
 
 def check_rest(case: MuscleCase) -> None:
-    """At the first frame every bone is where its surface is, and nothing acts that comes and goes, unless a stress at rest
-    balances it: the muscle rests.
+    """Check that the muscle is at rest at the first frame: every bone is where its surface is, and no effect with an amount over
+    time acts, unless a stress at rest balances it.
     """
     for i, effect in enumerate(case.effects):
         acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
@@ -70,7 +70,7 @@ def check_rest(case: MuscleCase) -> None:
     _check_slack(case)
     for i, bone in enumerate(case.bone):
         pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
-        if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
+        if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is not at rest
             slid = np.array_equal(pose[:3, :3], np.eye(3))
             what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
             raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
@@ -79,7 +79,7 @@ def check_rest(case: MuscleCase) -> None:
 def _check_slack(case: MuscleCase) -> None:
     """Check that passive fibres pull in the given shape only beside a stress at rest that balances them."""
     for i, effect in enumerate(case.effects):
-        # Beside the given length, as laws have a kink there.
+        # Slightly beyond the given length, where laws have a kink.
         pull = fibre_tension(effect.energy, _GIVEN) if isinstance(effect, PassiveFibres) else 0.0
         if not pull <= 0 and in_situ.among(case.effects) is None:
             want = 'slack ones, as by an optimal_stretch of at least 1, or the effect "in_situ", which balances them'
@@ -88,7 +88,7 @@ def _check_slack(case: MuscleCase) -> None:
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Check that bones have a name each, contact is with some of them, and ``frames`` have an interval where time matters."""
+    """Check that bones have distinct names, contact is with some bones, and ``frames`` have an interval if time matters."""
     check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from fem_reference.foundations.records import Record, directed, one_of
 from fem_reference.foundations.units import Angle, LengthUnit
 
-# A template more inclined than this [rad] would have no fibre that is as long as the muscle is wide.
+# Fibres of a template that is inclined more than this [rad] would all be shorter than the muscle is wide.
 _STEEPEST = math.radians(60)
 
 
@@ -57,8 +57,8 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres interpolated between those on the muscle's surface. ``heads``: a file for each head, with three or more fibres around
-    it. ``around``: lines of the Laplace field just below the surface, if there is no file.
+    """Fibres interpolated between fibres on the muscle's surface. ``heads``: a file for each head, with three or more fibres around
+    it. ``around``: without files, lines of the Laplace field just below the surface in their place.
     """
 
     count: int = Field(gt=0, le=1000)
@@ -78,8 +78,8 @@ class FibreTurn(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
 
-    ``turned``: the fibre directions of the material are those of the lines, rotated by the same angle everywhere; the measured
-    lengths remain those of the lines.
+    ``turned``: a rotation, the same everywhere, from the directions of the lines to the fibre directions of the material; the
+    measured lengths remain those of the lines.
 
     ``complete``: ends more than 2 mm from an attachment without a ``tendon`` are extended, in the muscle or along its surface, to
     the nearest point of the attachment.
@@ -96,7 +96,7 @@ class Fibres(Record):
 
     @property
     def ends(self) -> dict[str, str]:
-        """The attachments that the fibres run between, by the key that names them; none where a file has the fibres."""
+        """The attachments between which the fibres run, by the key that names them; none for fibres from a file."""
         around = None if self.chmd is None else self.chmd.around
         between = {"traced": self.traced, "kohout_kukacka": self.kohout_kukacka, "chmd.around": around}
         return {

@@ -16,7 +16,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.regions import CaseRegion
 
-# [mm]: no grid resolves a smaller error of the distance to a bone, or a smaller rounding.
+# The least error of the distance to a bone, and the least rounding, that a grid can resolve [mm].
 _FINEST = 1e-3
 MOST_FRAMES = 100_000
 LAST_FRAME = 1_000_000_000
@@ -63,7 +63,7 @@ class Motion(Record):
         """The motion as poses over frame numbers."""
         frames = tuple(key.frame for key in self.keyframes)
         axis = self.axis if self.direction is None else self.direction
-        assert axis is not None  # a Motion record has one of the two
+        assert axis is not None  # a Motion record has an axis or a direction
         return RigidMotion(axis, self.centre, frames, tuple(key.angle or key.distance or 0.0 for key in self.keyframes))
 
 
@@ -75,7 +75,7 @@ class CaseHalfSpace(Record):
 
 
 class CaseBox(Record):
-    """A box about ``centre`` with edges along the axes, of outer ``size``, edges and corners of radius ``rounding``."""
+    """A box about ``centre`` of outer ``size``, with edges along the axes; ``rounding``: the radius of edges and corners."""
 
     centre: Point
     size: Point
@@ -119,7 +119,7 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: exactly one of a ``surface`` in a file, its coordinates in ``unit``, and the closed forms; at rest without
+    """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; it rests without
     ``motion``. ``distance_error``: the error allowed in the distance to a surface, root mean square near it, before rounding.
     ``distance_rounding``: the standard deviation of a Gaussian mean of that distance, as nothing slides smoothly on flat triangles.
     """
@@ -160,7 +160,7 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often these are cut into eight.
     ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
     """
 
@@ -186,7 +186,7 @@ class Shift(Record):
 
 
 class Outline(Record):
-    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves only the clouds."""
+    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves the clouds only."""
 
     file: str
     unit: LengthUnit
@@ -204,9 +204,9 @@ class Landmarks(Record):
 
 
 class Attachment(Record):
-    """The part of the muscle surface that is attached to a bone, by exactly one of ``vertices``, ``within`` (of the bone) and
-    ``outline``: by springs of a ``stiffness`` over its area, or clamped without it. Fibres that end beside it continue as a
-    straight ``tendon`` to a point of the bone: in their lengths only, unless the effect ``tendon`` makes it pull.
+    """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
+    the bone) and ``outline``. Springs of a ``stiffness`` over its area hold it; without a stiffness it moves exactly with the bone.
+    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone, which pulls only with the effect ``tendon``.
     """
 
     name: Name
@@ -247,7 +247,7 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of a number of the case, by its ``key`` such as ``effect[0].mu``; it replaces the range that the effect states."""
+    """The range of a number of the case by its ``key``, such as ``effect[0].mu``; it replaces the range stated by the effect."""
 
     key: str
 

@@ -16,15 +16,15 @@ from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, DrivenCase, Muscle, MuscleCase
 from fem_reference.scenes.regions import CaseRegion
 
-# Keys of one muscle among several; in the case of a single muscle they are keys of the case.
+# Keys of each of several muscles; in a case of a single muscle they are keys of the case.
 BESIDE = ("attachment", "fibres", "region", "expect")
-# The keys of the case that the case of each muscle has too.
+# The keys of the case that the cases of its muscles share.
 _SHARED = ("proves", "choice", "bone", "joint", "frames", "reference", "candidate", "folder", "from_file")
 
 
 class MuscleOfSeveral(Muscle):
-    """One of several muscles: its ``name``, which is also in the names of its forces, and its own tables. ``effect``: those that
-    act in it, besides those of the case; ``expect``: its expectations.
+    """One of several muscles: its ``name``, which is also part of the names of its forces, and its own tables. ``effect``: the
+    effects that act in it alone; ``expect``: its expectations.
     """
 
     name: Name
@@ -44,22 +44,22 @@ class MusclesCase(DrivenCase):
 
     @property
     def touching(self) -> MuscleContact | None:
-        """The contact between the muscles, None without."""
+        """The contact between the muscles, None where there is none."""
         return among(self.effect)
 
     @property
     def apart(self) -> bool:
-        """True where muscles must not cross: contact acts between them, or was left out as they do not come near."""
+        """True where muscles must not cross: contact acts between them, or was left out because they do not come near."""
         return any(isinstance(one, MuscleContact) for one in (*self.effect, *(some.effect for some in self.decisions)))
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """The effects of all muscles, then those of each."""
+        """The effects that act on all muscles, then those of each muscle."""
         return (*self.effect, *(one for muscle in self.muscle for one in muscle.effect))
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by their names, those of one muscle after its name."""
+        """The effects by their names; the name of an effect on one muscle follows that of the muscle."""
         own = {f"{muscle.name}: {one.title}": one for muscle in self.muscle for one in muscle.effect}
         return {one.title: one for one in self.effect} | own
 
@@ -73,8 +73,8 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine its solution, without expectations; with ``apart`` where the second check has to test whether
-        muscles cross and no effect states it.
+        """The keys that determine its solution, without expectations; also ``apart``, where the second check tests whether muscles
+        cross although no effect shows it.
         """
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
@@ -94,7 +94,7 @@ class MusclesCase(DrivenCase):
 
     @contextmanager
     def placed(self, i: int) -> Iterator[None]:
-        """Give the place in the scene to InputErrors of the muscle of number ``i`` as a case."""
+        """Give an InputError about the case of muscle number ``i`` its place in the scene."""
         try:
             yield
         except InputError as error:
@@ -105,7 +105,7 @@ class MusclesCase(DrivenCase):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The key in the scene of a ``key`` in the case of the muscle of number ``i``, where effects of all come before its own."""
+        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles precede its own."""
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):
@@ -119,7 +119,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:
-        """Each muscle as a case of its own, without the others; they were checked when this case was read."""
+        """Each muscle as a case of its own, without the others; these cases were checked when this case was read."""
         everywhere, found = tuple(one for one in self.effect if not isinstance(one, MuscleContact)), list[MuscleCase]()
         for i, muscle in enumerate(self.muscle):
             made: dict[str, Any] = {name: getattr(self, name) for name in _SHARED}
@@ -132,7 +132,7 @@ class MusclesCase(DrivenCase):
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
-    """The ``table`` of a scene with one muscle in a list as that of a scene of a muscle; unchanged where it has several."""
+    """The ``table`` of a scene whose list has one muscle, rewritten as that of a single muscle; unchanged where it has several."""
     listed = table.get("muscle")
     if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):
         return table

@@ -60,7 +60,7 @@ def read(case: Case, key: str, value: str | float) -> float:
 
 def changed[C: Case](case: C, values: dict[str, float]) -> C:
     """The ``case`` with other numbers by key, in their internal units; each number and the records around it are checked as in a
-    scene file. Checks between records follow in :func:`fem_reference.scenes.casefile.with_numbers`.
+    scene file. :func:`fem_reference.scenes.casefile.with_numbers` also makes the checks across records.
     """
     for key, value in values.items():
         found: Any = read(case, key, value)

@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Numbers besides those of effects that leave the measurement of runs unchanged: the lines, bones and frames of the case.
+# Keys of numbers, besides those of effects, whose change leaves the measured lines, bones and frames as they are.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
@@ -17,7 +17,7 @@ _VARIED = (
 
 
 def ranges(case: MuscleCase) -> dict[str, Range]:
-    """The ranges by key: the published ones of the parameters of its effects, and its own, which replace these."""
+    """The ranges by key: the published ranges of the parameters of its effects, unless the case states its own."""
     stated = {
         f"effect[{i}].{name}": one for i, effect in enumerate(case.effects) for name, one in effect.published.items()
     }
@@ -59,7 +59,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
 
 
 def check(case: MuscleCase) -> None:
-    """InputError where a ``case`` states a range for a key that is not a number of it, or with invalid ends."""
+    """Raise InputError where a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")

@@ -43,7 +43,7 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """The part with values ``first`` to ``last`` of the Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
+    """The part in which the Laplace field, 0 on the attachment ``start`` and 1 on ``end``, is from ``first`` to ``last``."""
 
     start: str
     end: str
@@ -59,8 +59,9 @@ class ShareOfField(Record):
 
 
 class CaseRegion(Record):
-    """A part of the muscle at rest in which effects act (``in``): exactly one of ``attachment``, ``patch``, ``surface``, ``tets``
-    and ``field``. The share of a point in it is 0 at its border and 1 from a depth of ``width`` on. Regions of one name are united.
+    """A part of the muscle at rest in which effects act (``in``), given by exactly one of ``attachment``, ``patch``, ``surface``,
+    ``tets`` and ``field``. The share of a point in it grows from 0 at its border to 1 at a depth of ``width``. Regions of one name
+    are united.
     """
 
     name: Name

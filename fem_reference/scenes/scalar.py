@@ -16,7 +16,7 @@ _Nodes = Annotated[
 
 
 class Interval(Record):
-    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` those between are at random positions."""
+    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` the inner ones are at random positions."""
 
     start: float
     end: float
@@ -63,7 +63,7 @@ class Boundary(Record):
     """A boundary condition, in one of two forms.
 
     The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
-    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets with a value above zero at every vertex.
+    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to the facets at whose vertices it is above zero.
     The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
     values. The slope is 0 on the rest of the boundary.
     """
@@ -118,7 +118,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """Standards that a run is measured against, ``of`` a candidate or the ``"reference"``: a field has no rest state."""
+        """The standards against which a run ``of`` a candidate or of the ``"reference"`` is measured; a field has no rest state."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")

@@ -22,7 +22,7 @@ def names(task: Task | None = None) -> list[str]:
     """The names of all solvers in scene files, or of those for a ``task``."""
     found = [
         name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")
-    ]  # these serve solvers
+    ]  # modules that are no solvers but serve them
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 

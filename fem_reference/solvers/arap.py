@@ -2,9 +2,9 @@
 
 Frame number n is the state with the bones in their pose of frame n. Attached vertices move with their bone exactly. From the
 previous state, the method alternates between the rotations of all cells (local step) and the positions of free vertices (global
-step). Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
-over its own unknowns, so that the energy never rises. Negative weights do not change that, as the matrix is still that of
-linear elements, which is positive. Attachments by springs are rigid here, and there is no contact.
+step). Where the rows of attached vertices are removed and the weight of an edge is the same from both ends, both steps minimise eq.
+5.10, each over its own unknowns, so that the energy never rises. Negative weights do not change this, as the matrix is still
+that of linear elements, which is positive. Attachments by springs are exact here, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def cells_of(surface: Surface, weights: Weights) -> VertexCells:
     """The cells of a closed surface with ``weights`` named as in the settings."""
     matrix = _edge_weights(surface, weights)
     starts, neighbours = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
-    return VertexCells(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code wants writable arrays
+    return VertexCells(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code needs writable arrays
 
 
 def laplacian(cells: VertexCells) -> Any:
@@ -116,7 +116,7 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The ``points`` (n, 3) [mm] of a frame after ``iterations``, True if these ``met`` the tolerance, if any, and the trouble."""
+    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: True if they met the tolerance, if any; the trouble."""
 
     points: Floats
     iterations: int
@@ -199,8 +199,8 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached if all vertices are free; as attached vertices stay, some of it is missing. A surface that
-    encloses nothing stays as it is.
+    V0 is ``volume`` [mm3]. It is reached only if all vertices are free, as attached vertices stay in place. A surface that encloses
+    no volume is not changed.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
     factor = np.cbrt(volume / inside) if inside > 0 else 1.0
@@ -248,7 +248,7 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
 
 _REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": False}
 _REPORTED |= {"iterations": 4}
-# The second row is scaled by eq. 5.9 after each iteration, section 6.2.
+# The second row of the table is scaled by eq. 5.9 after each iteration (section 6.2).
 _TABLE = (
     TableRow("ARAP", "arap", _REPORTED),
     TableRow("ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}),

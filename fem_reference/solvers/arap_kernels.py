@@ -64,9 +64,9 @@ def _diagonalise(matrix: Floats, vectors: Floats) -> None:
 def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Floats) -> None:
     """The ``rotation`` R (3, 3), det R = 1, for which sum_ab R_ab C_ba is greatest; ``matrix``, ``vectors`` (4, 4) are scratch.
 
-    It is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C, read as a quaternion (Horn 1987,
-    doi:10.1364/JOSAA.4.000629). The report's singular values give the same, except in cells that are flat or inside out, where
-    they give a reflection.
+    As a quaternion it is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
+    doi:10.1364/JOSAA.4.000629). The report's singular value decomposition gives the same, except in cells that are flat or inside
+    out, where it gives a reflection.
     """
     C = covariance
     matrix[0, 0] = C[0, 0] + C[1, 1] + C[2, 2]

@@ -1,8 +1,8 @@
 """ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
 *The volume as a constraint* of the ARAP energy, in place of a scaling after each step: the positions of a global step solve
-``L p' = b + lambda grad V``. The gradient is that of the previous iteration, and the multiplier lambda is such that the enclosed
-volume is that of rest. At convergence, the gradient of the energy is a multiple of that of the volume. *ARAP as initial guess*:
+``L p' = b + lambda grad V``. The gradient is taken at the previous iteration, and the multiplier lambda is such that the enclosed
+volume is that at rest. At convergence, the gradient of the energy is a multiple of that of the volume. *ARAP as initial guess*:
 sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame; there are no velocities.
 If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
@@ -82,8 +82,8 @@ def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
 def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
     """Local and global steps from ``points`` (n, 3), as many as the settings demand, at the volume of ``rest`` if they demand it.
 
-    Diverged where the volume moves a point farther from the minimum of a global step than the edge of a cube of that volume: then
-    only folds keep the volume, at another root of the cubic.
+    Diverged where the volume constraint moves a point from the minimum of a global step by more than the edge of a cube of that
+    volume: then the volume is kept only by folds, at another root of the cubic.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
@@ -101,7 +101,7 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 
 
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
-    """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, and the least such lambda.
+    """``p + lambda L^-1 grad V``, with the lambda nearest to 0 at which the volume is that of ``rest``.
 
     p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` it. The volume is a cubic
     in lambda; Newton's method refines its root nearest to 0. Without a root the minimum is returned.

@@ -96,8 +96,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that are ``clear`` (n,) [mm] or more from ``asked_at`` (n, 3), all
-    in the rest frame of a bone at ``pose``.
+    """Indices (k,) and positions (k, 3) of those ``points`` (n, 3) that are ``clear`` (n,) [mm] or farther from their places at the
+    last check, ``asked_at`` (n, 3), all in the rest frame of a bone at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
@@ -118,7 +118,7 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 class CollidingBone:
     """A bone, the distance that it allows each vertex, and the last known distances.
 
-    A vertex may come as near as ``gap`` [mm], or as near as at rest where that is less, so that nothing jumps at the first step.
+    A vertex may come as near as ``gap`` [mm], or as it is at rest where that is nearer, so that nothing jumps at the first step.
     Vertices that are not ``free`` (n,) are never checked.
     """
 
@@ -166,9 +166,9 @@ def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: fl
 
 
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
-    """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the displacements out of every bone that it is in.
+    """Move ``points`` (n, 3) [mm] in place out of all bones, each by the sum of its displacements out of the bones that contain it.
 
-    ``stiffness`` is the share of each displacement that is applied. The masses cancel: a constraint has one vertex.
+    ``stiffness`` is the share of each displacement that is applied. Masses cancel, as each constraint has a single vertex.
     """
     moves = np.zeros_like(points)
     for one in bones:

@@ -78,8 +78,8 @@ class CommandSettings(Record):
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The program; files that the command names, also after ``=`` and by values of settings; for a Python file, all Python files
-    in its folder and below; and ``files``.
+    """The program; the files that the command names, also after ``=`` and as values of settings; with a Python file, all Python
+    files in its folder and below; and ``files``.
     """
     directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
@@ -194,7 +194,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         """The record with a required key for each setting in the command; one with a ladder is marked as ``Trade``."""
         command, ladder = given.get("command"), given.get("ladder", {})
         if not isinstance(command, str) or not isinstance(ladder, Mapping):
-            return self.settings  # which says what is wrong
+            return self.settings  # this record then reports the error
         names = placeholders(command, place)
         for key in ladder:
             _check_named(key, names, join(place, "ladder"))
@@ -275,7 +275,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The time that the program states for its frames alone; InputError where that exceeds its run time."""
+    """The time that the program states for solving its frames alone; InputError where that exceeds the time of its run."""
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

@@ -69,7 +69,7 @@ class Shortest:
         return _lengths(self.lines.at(number), self.wraps.around(self.lines.at(number).points, number))
 
     def move(self, number: int) -> None:
-        """Find the paths at a frame."""
+        """Find the paths of the lines at a frame."""
         passed = self.lines.at(number)
         wrong = self.wraps.inside(passed.points, number)[1]
         if not wrong:
@@ -79,7 +79,7 @@ class Shortest:
             self.wrong = Trouble("diverged", wrong)
         else:
             points = paths.at(passed.part, passed.share)  # as many as the fibres have
-            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # cut off by chords
+            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
             scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
             self.found = Frame(number, None, fibres=points, scalars=scalars)
 
@@ -108,7 +108,7 @@ class Shortest:
 
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
-    """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
+    """The lines at every requested frame, up to one with a fixed point inside an obstacle; InputError if that is the first."""
     return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
@@ -139,7 +139,7 @@ def _on_bones(
 ) -> dict[str, float]:
     """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
 
-    A part pulls at both of its ends along itself; an obstacle gets the pulls of both sides, as what lies on it has no weight.
+    A part pulls along itself at both of its ends; an obstacle bears the pulls of both sides, as the line on it has no weight.
     """
     fixed, on_bone = passed.points, passed.on
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]

@@ -21,7 +21,7 @@ from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.protocol import FieldSolver
 
-# Listing 4.5, line 18: the factors of A A, A and 1.
+# The factors of A A, A and the unit matrix in line 18 of listing 4.5.
 SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
@@ -119,8 +119,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
     """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
 
-    Their columns go to the right side, their rows and columns become those of the unit matrix. A vertex named twice is
-    refused: the listing would use its first value for the neighbours and its last for the vertex.
+    Their columns go to the right side; then their rows and columns become those of the unit matrix. A vertex that is named twice
+    is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):

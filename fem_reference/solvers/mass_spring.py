@@ -29,7 +29,7 @@ from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advanc
 
 # The default time step over the greatest stable one.
 SHARE_OF_STABLE = 0.9
-# A run with more steps for each frame number is refused: on 3,000 tetrahedra a frame number would take two seconds.
+# A run with more steps per frame number than this is refused: with 3,000 tetrahedra a frame number would take over two seconds.
 _MOST_STEPS = 100_000
 # Time steps in one call of compiled code: the user can interrupt only between calls.
 _AT_ONCE = 200
@@ -118,7 +118,7 @@ class MassSpringModel:
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
         self.fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *self.attached]))
         skin = boundary(mesh.tets)[0]
-        # Interior masses collide with nothing.
+        # Only masses on the surface collide with bones.
         still = np.union1d(self.fixed, np.setdiff1d(np.arange(len(mesh.points)), skin))
         self.bones = [] if collision is None else colliding_bones(problem.bones, mesh.points, still, collision.gap)
         self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
@@ -137,7 +137,7 @@ class MassSpringModel:
         self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
 
     def move(self, number: int) -> None:
-        """Take the steps from the frame number before to ``number``."""
+        """Take the time steps from the previous frame number to ``number``."""
         before, after = (self.carried(frame)[self.fixed] for frame in (number - 1, number))
         at_once = 1 if self.bones else _AT_ONCE
         for done in range(0, self.steps, at_once):

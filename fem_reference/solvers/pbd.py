@@ -29,7 +29,7 @@ _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or that at rest where it is less;
     ``stiffness``: the share of the displacement out of a bone that one projection makes.
     """
 
@@ -85,7 +85,7 @@ class PbdConstraints:
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
         """The constraints of a closed surface with ``attached`` vertices (k,); all edges are equally stiff."""
-        points, triangles = np.array(points), np.array(triangles)  # compiled functions accept writable arrays only
+        points, triangles = np.array(points), np.array(triangles)  # compiled functions need writable arrays
         inverse_masses = np.ones(len(points))
         inverse_masses[attached] = 0
         hinges = hinges_of(triangles)

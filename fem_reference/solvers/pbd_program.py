@@ -50,7 +50,7 @@ from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import PbdConstraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances
 
-# The time step [s]. It cancels but for rounding.
+# The time step [s]; it cancels, up to rounding.
 STEP = 1e-3
 # Decimal places of the motion between two poses, so that 90 mm in 100 iterations are exactly 0.9 mm in each.
 DIGITS = 12
@@ -100,7 +100,7 @@ class Voxels:
 
 
 class VoxelBone:
-    """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion other than none; both 4 x 4.
+    """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion that was not zero; both 4 x 4.
 
     The pose is the product of all motions, as in the program; it differs from the ``given`` one by rounding.
     """
@@ -156,7 +156,7 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
     share = np.ones(len(edges))
     if settings.anisotropy is not None:
         fibres = setup.rest.fibres
-        assert fibres is not None  # as the solver asks for them
+        assert fibres is not None  # with these settings the solver gets fibres
         share = (1 - along_fibres(points, edges, fibres)) ** settings.anisotropy
     return PbdConstraints(
         inverse_masses=np.ones(len(points)),

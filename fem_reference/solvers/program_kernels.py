@@ -17,7 +17,7 @@ from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, mov
 
 Bools = NDArray[np.bool_]
 
-# Pairs of triangles whose normals have a greater cosine, of either sign, are left alone.
+# Pairs of triangles whose normals have a cosine of greater magnitude than this are left as they are.
 FLAT_COSINE = 1 - 1e-10
 # A fold is corrected only if the ratio of the correction to its gradient is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
@@ -100,7 +100,7 @@ def angles_of(normals: Floats, pairs: Ints) -> Floats:
 
 @compiled
 def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
-    """``point x other + cosine own x point``: how the cosine of two unit normals grows with the size of one's triangle."""
+    """``point x other + cosine own x point``, a term of the gradients of the cosine of two unit normals (Mueller 2007)."""
     return plus(cross(point, other), times(cosine, cross(own, point)))
 
 
@@ -175,8 +175,8 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
     """True where the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
 
-    It does where its plane is near, and beyond none of its edges by more than a diagonal. The planes at the edges are taken
-    with its ``normal`` in mm, though voxels are no cubes.
+    It marks the voxel if its plane is near and the corner is beyond none of its edges by more than a diagonal. The planes at the
+    edges are made with its ``normal`` in mm, although voxels are not cubes.
     """
     away = _unit_normal(minus(b, a), minus(c, a))
     if abs(dot(away, minus(corner, a))) > DIAGONAL / 2:

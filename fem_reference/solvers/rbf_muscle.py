@@ -34,9 +34,9 @@ from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd_kernels import volume
 
-# Neighbours of a node, and nodes of an attachment.
+# The number of neighbours of a node, and of nodes of an attachment.
 _AROUND, _HANDLES = 8, 12
-# Rounds of pushing centres out of bones, and of scaling radii.
+# The number of rounds in which centres are pushed out of bones, and in which radii are scaled.
 _PUSHES, _SCALINGS = 4, 3
 
 
@@ -125,7 +125,7 @@ class RbfMuscle(MovingSurface):
         self.volume = enclosed_volume(rest.points, rest.triangles)
         self.nodes = self.cloud.nodes
         self.cost["unknowns"] = 4.0 * settings.gaussians
-        self.cloud.relax(self.nodes, 1)  # compiled here, not in the time of the first frame
+        self.cloud.relax(self.nodes, 1)  # compiles the code here, outside the time of the first frame
 
     def move(self, number: int) -> None:
         """Find the muscle at a frame."""
@@ -166,7 +166,7 @@ class RbfMuscle(MovingSurface):
             bony = points.copy()
             carry(bony, self.setup, number)
             points += self.beside[:, None] * (bony - points)[self.nearest]
-            carry(points, self.setup, number)  # exactly, however far the surface of the Gaussians was
+            carry(points, self.setup, number)  # exactly, even if the surface of the Gaussians is far away
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
         if self.settings.volume:  # free vertices correct the remaining error along its gradient
             six, gradient = volume(points, self.setup.surface.triangles)

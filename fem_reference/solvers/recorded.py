@@ -31,11 +31,11 @@ AT_REST = 0.1
 # Greatest distance at all, in diagonals of the rest surface's bounding box: above the change that solvers make in their first
 # frame, below that of a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a ball).
 NEAR_REST = 0.05
-# Least size of a frame over that at rest: no solver folds a body up this far, but a frame in m is 1/1000 as large as one in mm.
+# Least size of a frame over that at rest: no solver shrinks a body below it, but a frame in m is 1/1000 as large as one in mm.
 SMALLEST = 1 / 50
 # Greatest distance [mm] between corners of an STL file that are one vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
-# Greatest distance, in frames, of a time from its frame: above rounding to four digits, below any half step.
+# Greatest distance of a time from that of its frame, in frames: above rounding to four digits, and far below half a frame.
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
@@ -234,7 +234,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True (m,) for ``triangles`` (m, 3) that occur more often than among ``rest`` (m, 3), whichever corner comes first."""
+    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), with any of their corners first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -253,7 +253,7 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
         points[vertices] = soup.points
-        gaps = np.linalg.norm(points[vertices] - soup.points, axis=1)  # of corners from the last one at their vertex
+        gaps = np.linalg.norm(points[vertices] - soup.points, axis=1)  # from the last corner at the same vertex
         found.append((float(gaps.max()), int(vertices[gaps.argmax()]), points.copy()))
     gap, vertex, points = min(found, key=lambda one: one[0])
     if gap > SAME_POINT:

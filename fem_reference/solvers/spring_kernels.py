@@ -26,7 +26,7 @@ class Network(NamedTuple):
 
 
 class PrescribedPath(NamedTuple):
-    """Masses ``fixed`` (h,), and where they are (h, 3) [mm] ``before`` and ``after``: they go from one to the other evenly."""
+    """Masses ``fixed`` (h,) that move at constant velocity from their positions ``before`` to those ``after``, (h, 3) [mm]."""
 
     fixed: Ints
     before: Floats

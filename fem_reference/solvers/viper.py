@@ -30,7 +30,7 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
 
-# Neighbours of a rod in its bundle, and points of rods that carry a vertex.
+# The number of neighbours of a rod in its bundle, and of points of rods that carry a vertex.
 _AROUND, _CARRIERS = 6, 12
 
 
@@ -136,7 +136,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and turns as if each rod were fixed to the bones ``ends`` (k,) of one end since the frame before ``number``."""
+        """Points and turns as if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last number."""
         points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
             bone = self.problem.bones[n]
@@ -189,7 +189,7 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
     asked = min(count + 1, len(carriers))
     away, near = (found.reshape(len(points), asked) for found in cKDTree(carriers).query(points, k=asked))
     reach = away[:, -1:] * (1 if asked > count else 2) + np.finfo(float).tiny
-    # If all are equally near, each has the same share.
+    # If all are equally near, all get the same share.
     weights = (1 - (away / reach) ** 2) ** 2 + 1e-12
     weights /= weights.sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(points)), asked)

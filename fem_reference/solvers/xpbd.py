@@ -32,7 +32,7 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or that at rest where it is less;
     ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
     """
 
@@ -91,10 +91,10 @@ class XpbdConstraints:
         triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
         as a plate of the stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
         """
-        # Compiled functions accept writable arrays only.
+        # Compiled functions need writable arrays.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
+        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # both
         slender = distances(points, hinges) ** 2 / areas
         stiffnesses = settings.stretch, settings.bending, settings.volume
         stretched, bent, filled = (slice(None if stiffness else 0) for stiffness in stiffnesses)
@@ -210,7 +210,7 @@ class XpbdSurface(MovingSurface):
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
-# The same constraints, with compliances in place of stiffnesses.
+# The constraints of the solver pbd, with compliances in place of stiffnesses.
 _TABLE = TableRow(
     "PBD",
     "xpbd",

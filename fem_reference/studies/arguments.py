@@ -14,7 +14,7 @@ from fem_reference.scenes.case import Case
 
 
 def check[T](given: object, kind: type[T], place: str, want: str) -> T:
-    """The argument that is ``given``; InputError unless it is of a ``kind``."""
+    """The ``given`` argument; InputError unless it is of a ``kind``."""
     if not isinstance(given, kind):
         raise InputError(place, said(given), want)
     return given
@@ -35,14 +35,14 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_keys(keys: object) -> Sequence[str]:
-    """The keys; InputError unless they are a list of texts."""
+    """The ``keys``; InputError unless they are a list of texts."""
     if not isinstance(keys, Sequence) or isinstance(keys, str) or not all(isinstance(key, str) for key in keys):
         raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
     return keys
 
 
 def check_changes(changes: object) -> None:
-    """Raise InputError unless they are keys and values, or None."""
+    """Raise InputError unless ``changes`` are values by key, or None."""
     keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)
     if not all(isinstance(key, str) for key in keys):
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
@@ -72,7 +72,7 @@ def check_comparison(comparison: object) -> Comparison:
 
 
 def check_error_bars(bars: object, case: Case) -> None:
-    """Raise InputError unless they are error bars of a reference of the ``case``, or None."""
+    """Raise InputError unless ``bars`` are error bars of a reference of the ``case``, or None."""
     if bars is None:
         return
     known = check(bars, ErrorBars, "error_bars", "ErrorBars, such as error_bars returns, or None")
@@ -82,7 +82,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless it is a run of the ``case``, if it names a case at all."""
+    """Raise InputError unless ``given`` is a run, and one of the ``case`` if it names a case at all."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}

@@ -16,13 +16,13 @@ from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
 
-# A remark on the candidates.
+# A remark that pages of several muscles make on candidates.
 ALONE = "Each candidate solves each muscle by itself, without the other muscles."
 
 
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
-    """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, a pair of its muscles, the greatest depth
+    """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, two muscles in its run, the greatest depth
     [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
     """
 
@@ -76,7 +76,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate with its place; if recorded, with the folder of the muscle ``name``, or None where there is none."""
+    """A candidate with its place; for recorded frames with the folder of the muscle ``name``, or None where that does not exist."""
     entry, place = chosen
     if entry.solver != "recorded":
         return chosen

@@ -72,7 +72,7 @@ def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, wo
 
 
 def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
-    """The parameters at ``keys``, each with a range; InputError where one has none, or is of an effect that the case leaves out."""
+    """The parameters at ``keys``; InputError where one has no range, or belongs to an effect that the case leaves out."""
     known = {one.key: one for one in varied.parameters()}
     for key in keys:
         numbers.number(varied.whole, key)

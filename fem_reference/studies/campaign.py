@@ -24,9 +24,9 @@ from fem_reference.studies.variations import Trial, without_states
 
 log = logging.getLogger(__name__)
 
-# Attempts at a run whose worker died.
+# The number of attempts at a run whose worker died.
 ATTEMPTS = 3
-# A run that ended with one of these would do so again; one that timed out or crashed may succeed.
+# A run that ended with one of these statuses would do so again; one that timed out or crashed may succeed.
 _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
@@ -34,7 +34,7 @@ _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 @dataclass(frozen=True)
 class Workers:
     """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at ``address``, such as
-    one that dask-jobqueue started on a cluster; these see the same store. InputError where there are fewer than one.
+    one that dask-jobqueue started on a cluster; all need access to the store. InputError where ``count`` is below one.
     """
 
     count: int = 1
@@ -71,7 +71,7 @@ class Made:
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
-    """The results ``of`` scenes by name, and the reasons why others have none: InputError."""
+    """The results of the function ``of`` for the scenes by name, and by name the InputError of each scene without one."""
     found, missing = dict[str, T](), dict[str, str]()
     for name, scene in scenes.items():
         try:
@@ -94,7 +94,7 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
 
 
 def spread[S, T](of: Callable[[S], T], items: Sequence[S], workers: Workers) -> list[T]:
-    """The results ``of`` items in their order, by ``workers``."""
+    """The results of the function ``of`` for all ``items``, in their order, computed by ``workers``."""
     if workers == Workers():
         return [of(item) for item in items]
     with _executor(workers) as executor:
@@ -102,7 +102,7 @@ def spread[S, T](of: Callable[[S], T], items: Sequence[S], workers: Workers) -> 
 
 
 def solve(trial: Trial, store: Path) -> Run:
-    """The run of a trial, in this process; one that failed before, and would fail again, is not repeated."""
+    """The run of a trial, solved in this process; a stored run that failed and would fail again is not repeated."""
     bench = shared_bench(trial.scene, store)
     folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:
@@ -111,7 +111,7 @@ def solve(trial: Trial, store: Path) -> Run:
 
 
 def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench, and so the tetrahedra, that runs on a case share in this process, which keeps two of them."""
+    """The bench that runs on a case share in this process, and with it their tetrahedra; the process keeps two benches."""
     key = case.key, store, case.folder
     if key not in _BENCHES:
         for old in list(_BENCHES)[:-1]:
@@ -171,7 +171,7 @@ def _executor(workers: Workers) -> Iterator[Executor]:
         with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
             try:
                 yield executor
-            except BaseException:  # an interruption too: else the executor would wait for runs in progress
+            except BaseException:  # also an interruption: otherwise the executor would wait for runs in progress
                 for worker in set(multiprocessing.active_children()) - before:
                     worker.terminate()
                 raise

@@ -32,10 +32,10 @@ log = logging.getLogger(__name__)
 METRICS = (*in_tables(), "joint_moment")
 # Surface solvers also run on 4**power times as many triangles; these surfaces are stored beside the runs.
 _POWERS = (-1, 1)
-_MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
+_MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, most of a study's time
 SURFACES = "surfaces"
 FILE = "study.json"
-# For this many of the reference's coarser runs, the finest of them, claimed error bars are compared with true errors.
+# The number of the reference's coarser runs, the finest ones, for which claimed error bars are compared with true errors.
 _CLAIMING = 4
 
 
@@ -124,7 +124,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the solver's defaults, whether or not the case states the others, and the hash of a
+    """The settings of a trial that differ from the solver's defaults (others are left out, even if stated), and the hash of a
     program.
     """
     given = trial.choice.settings
@@ -157,7 +157,7 @@ def costs(run: Run) -> dict[str, float]:
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
     found = {name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")}
-    # A program states its time per frame number; one frame of the scene may be several of these.
+    # A program states its time per frame number; from one frame of the scene to the next there may be several numbers.
     return found | ({} if seconds is None else {"seconds_per_frame": seconds})
 
 

@@ -13,8 +13,8 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 
 Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
-_STEP = 1e-4  # of a parameter's logarithm, far above the error of root finding, 1e-8
-_MOST = 100  # evaluations; these fits converge in at most 30
+_STEP = 1e-4  # the step of a parameter's logarithm, far above the error of root finding, 1e-8
+_MOST = 100  # the most evaluations of a fit; these fits converge within 30
 _SHEAR = SHIPPED[0].parameters[0][1]
 
 
@@ -35,13 +35,13 @@ def shipped_law() -> Fitted:
     ended = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
     (shear,) = ended.parameters
     prior = find("bosboom_2001", "ogden_mu", "")
-    assert prior.sd is not None  # the fact has one
+    assert prior.sd is not None  # this fact has a standard deviation
     published = ((prior.value - prior.sd) / 1000, (prior.value + prior.sd) / 1000)  # MPa
     return _of("fibres in tension only", {"shear modulus [MPa]": (shear, published)}, _shipped(shear), to, ended)
 
 
 def collagen_law(most: int = _MOST) -> Fitted:
-    """The law with collagen across the fibres, fitted to all quantities but orders, which have no slope, in at ``most`` so many
+    """The law with collagen across the fibres, fitted to all quantities except orders, which have no slope, in at most ``most``
     evaluations. Only the fibres have a published range: no publication known here has ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]

@@ -43,9 +43,9 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Raise it with any change of scenes or stored arrays: the same version, seed and sizes mean the same scenes.
+# The version, to be raised with any change of scenes or stored arrays: equal version, seed and sizes mean equal scenes.
 VERSION = "1.0.0"
-SHIPPED = ("hip_flexion",)  # of the project's own geometry, without anatomy under another licence
+SHIPPED = ("hip_flexion",)  # cases with the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
 _TEST = 0.25  # the share of poses, and of shapes, in the test part
 _SAME = 0.01  # shapes whose volume and principal moments differ by less than this share are one shape
@@ -53,7 +53,7 @@ _SAME = 0.01  # shapes whose volume and principal moments differ by less than th
 
 @dataclass(frozen=True)
 class Sizes:
-    """A data set: the number of ``muscles`` drawn from a ``seed``, that of ``poses`` of each beside rest, and ``shipped`` cases."""
+    """The sizes of a data set: ``muscles`` drawn with a ``seed``, the ``poses`` of each besides rest, and ``shipped`` cases."""
 
     muscles: int
     poses: int
@@ -83,7 +83,9 @@ def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[st
     kept = [name for name in names if name not in reasons]
     if not kept:
         raise InputError(folder, f"no scene that passes: {reasons}", "one at least")
-    for other in {path.name for path in (folder / "scenes").iterdir()} - {*kept}:  # of a build of other sizes, stopped
+    for other in {path.name for path in (folder / "scenes").iterdir()} - {
+        *kept
+    }:  # left by a stopped build of other sizes
         shutil.rmtree(folder / "scenes" / other)
     files.write_text(folder / "load.py", Path(dataset_loader.__file__).read_text(encoding="utf-8"))
     found = {name: states.read_arrays(folder / "scenes" / name / "frames.npz") for name in kept}
@@ -105,7 +107,7 @@ def hashes(folder: Path) -> dict[str, str]:
 
 
 def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
-    """Make the scene ``name`` of a data set; the reason if it is left out, and its folder then removed, else an empty text."""
+    """Make the scene ``name`` of a data set; return the reason if it is left out, after removing its folder, else an empty text."""
     place = folder / "scenes" / name
     try:
         if name in wanted.shipped:
@@ -146,7 +148,7 @@ def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None)
         return "no error bar"
     result = compare(case, bench.setup(), run, (), bars)
     own = [one for one in result.verdicts if one.expectation.of == "reference"]
-    # Small det F at the rim of an attachment, which is singular, is in the error bars.
+    # A small det F at the singular rim of an attachment does not make a run unfit: the error bars cover it.
     others = {key: values for key, values in run.scalars.items() if not key.startswith("min_det_F")}
     said = [f"{one.expectation.metric} {one.word}" for one in own if one.word != "pass"]
     return "; ".join([*doubts(replace(run, scalars=others)), *said]) or ("" if own else "nothing is expected of it")
@@ -203,8 +205,8 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 
 
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
-    """Rows of frames by scene to train and to test with. By ``pose``: equal poses of a scene are in one part, rest in that for
-    training. By ``shape``: all scenes of one shape are in one part.
+    """Rows of frames by scene, for training and for testing. By ``pose``: equal poses of a scene are in the same part, rest in that
+    for training. By ``shape``: all scenes of the same shape are in the same part.
     """
     rng, names = np.random.default_rng(seed), list(found)
     parts: dict[str, dict[str, dict[str, list[int]]]] = {key: {"train": {}, "test": {}} for key in ("pose", "shape")}

@@ -41,12 +41,12 @@ from fem_reference.studies.execution import Bench
 log = logging.getLogger(__name__)
 
 CASES = ("hip_flexion", "gluteus_maximus", "gluteus_medius", "iliacus_anatomical", "adductor_brevis")
-KNOWN = (4, 6, 10, 20)  # points of a fibre
+KNOWN = (4, 6, 10, 20)  # numbers of known points of a fibre
 CENTRES, GAUSSIANS = (4, 9, 16, 25), (10, 30, 100)
-_ALONG = 1000  # sample points of a curve
-_POLYNOMIAL = 3  # terms of a plane
+_ALONG = 1000  # the number of sample points of a curve
+_POLYNOMIAL = 3  # the number of terms of a plane
 LAPLACE = "Laplace field"
-# The statistics of an answer that fibres may change, and the law of fibres in a case without one: that of hip_flexion.
+# The statistics of an answer that fibres may change, and the law of fibres for a case without one, which is that of hip_flexion.
 ANSWERS = (
     "surface_deviation.rms",
     "surface_deviation.max",
@@ -57,7 +57,7 @@ ANSWERS = (
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS, AROUND = 20, 20, 12
 NEAR = 0.2  # two fibres cross if they are nearer than this [mm] between their ends
-_ENDS = 0.1  # of a fibre, at either end, where attachments bring fibres together
+_ENDS = 0.1  # the share of a fibre left out at either end, where attachments bring fibres together
 _SAMPLED = 400  # sample points of a fibre
 _SAMPLES = 20_000  # random points in the box around a muscle
 _OUTSIDE = 1e-3  # a point is outside the surface beyond this distance [mm]
@@ -93,7 +93,7 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
 
 
 def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
-    """Distances (k,) [mm] of a ``line`` (n, 3) from the curve that ``make`` puts through ``count`` of its points, spread evenly."""
+    """Distances (k,) [mm] of points of a ``line`` (n, 3) from the curve by ``make`` through ``count`` others, evenly spread."""
     known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
     away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
@@ -104,7 +104,7 @@ def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
     for entry in setup.attached:
         flat = _flat(setup.surface.points[entry.vertices])
         for count in (count for count in CENTRES if 2 * count <= len(flat[::2])):
-            # In radii of the Gaussians, so that condition numbers do not depend on the unit of length.
+            # Lengths in radii of the Gaussians, so that condition numbers do not depend on the unit of length.
             places, heights = flat[:, :2] * np.sqrt(count) / float(np.ptp(flat[:, 0])), flat[:, 2]
             known, asked = places[::2], places[1::2]
             for choice, centres in _centres(known, heights[::2], count):
@@ -114,8 +114,8 @@ def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
 
 
 def _flat(points: Floats) -> Floats:
-    """Points (n, 3) of an area about their mean in its principal axes, the last across it, sorted along the first. They do not
-    depend on the axes of the scene or the order of the points: the third moment along each axis is positive.
+    """Points (n, 3) of an area relative to their mean, in its principal axes, the last across it, sorted along the first. They do
+    not depend on the axes of the scene or the order of the points: axes are such that third moments along them are positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
@@ -168,10 +168,10 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """The reference's answer on a case with each source of fibres, beside that with the Laplace field and its error bars. Lengths
-    are those of the lines of the Laplace field, carried by each surface.
+    """The reference's answer on a case with each source of fibres, compared with that with the Laplace field and its error bars.
+    Fibre lengths are those of the lines of the Laplace field, carried by each surface.
     """
-    # Candidates may not fit other fibres.
+    # Without candidates, which other fibres may not suit.
     alone = case.model_copy(update={"candidate": ()})
     if not any("fibre" in one.needs for one in case.effects):
         alone = alone.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})

@@ -43,13 +43,13 @@ class Bench[C: Case]:
     def __init__(self, scene: C, store: Path, ranks: int | None = None, time_limit: float = math.inf) -> None:
         self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
         self._scene, self.store, self.ranks = of_case.chosen(scene, self._setup), store, ranks
-        self.time_limit = time_limit  # [s] of processor time that a candidate may take
+        self.time_limit = time_limit  # the processor time [s] that a candidate may take
         self._begin()
 
     def _begin(self) -> None:
-        """Reset what depends on the effects that act, so that it is made again when needed."""
+        """Reset everything that depends on the effects that act, so that it is made again when needed."""
         self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
-        # Watches for effects that the case left out and that turn out to matter; None where it left out none.
+        # The watch for effects that the case left out but that turn out to matter; None where it left out none.
         self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
     @property
@@ -79,7 +79,7 @@ class Bench[C: Case]:
         return cast("Bench[MuscleCase]", self)
 
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
-        """The ``choice`` with its folder, if any, as a path: one that the scene names is looked up only where its files are."""
+        """The ``choice`` with its folder, if any, as a path; a folder that the scene names must be where its files may be."""
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
             return choice
@@ -131,7 +131,7 @@ class Bench[C: Case]:
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver, stored or solved now. ``name``: its name on pages; ``place``: the scene's key that chooses it."""
         run = self._run(name, choice, place, self._made)
-        assert run is not None  # what is not stored is made
+        assert run is not None  # a run that is not stored is made
         return run
 
     def reference(self) -> Run:
@@ -152,7 +152,7 @@ class Bench[C: Case]:
 
     def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
         """The stored run, or the one that ``make`` returns, with all effects that turn out to matter."""
-        if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
+        if choice.solver == "recorded":  # read each time, as files may change under the same name
             return self.read(name, choice, place)
         offer = solvers.find(choice.solver, place, self.scene.task)
         while True:
@@ -164,7 +164,7 @@ class Bench[C: Case]:
                 return run
             self._scene = of_case.with_effects(self.scene, found)
             self._begin()
-            assert run.folder is not None  # from the store
+            assert run.folder is not None  # it is in the store
             folder = self.folder(choice, place)
             with making.locked(folder):  # it continues the run that was stopped
                 pass_on(run.folder, folder)
@@ -196,7 +196,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``; if it is of a muscle, by a solver that models effects, with its second check, stored with it."""
+        """The ``run``, with its second check, which is stored with it, if a solver that models effects solved a muscle."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run

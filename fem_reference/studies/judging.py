@@ -27,9 +27,9 @@ from fem_reference.studies.execution import Bench
 log = logging.getLogger(__name__)
 
 
-_REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
+_REFINEMENTS = {2: 5, 3: 3}  # the number of refinements, by the number of vertices of a cell
 _MOST_CELLS = 100_000
-_EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
+_EXACT = 1e-9  # errors below this share of the solution are rounding, and show no order
 
 
 def compare(

@@ -21,7 +21,7 @@ from fem_reference.studies.execution import Bench
 # Effects of a case that the law of a solver replaces.
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
-# The shear modulus, in bulk moduli, added to a law that does not resist shear at rest, where its equilibrium is not unique.
+# The shear modulus, in bulk moduli, that is added to a law without shear stiffness at rest, whose equilibrium is not unique.
 # It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it Newton's method does not always converge.
 _WEAK = 1e-4
 
@@ -64,7 +64,7 @@ def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str
 
 
 def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -> Iterator[Run]:
-    """References without the effects that the solver leaves out; also in its law; also on linear tetrahedra."""
+    """References without the effects that the solver leaves out; then also with its law; then also on linear tetrahedra."""
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
     _check_held(bench)

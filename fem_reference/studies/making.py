@@ -47,7 +47,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run with a status of ``ended``; None without one, or if made by other packages or without wanted states."""
+        """The stored run, if its status is in ``ended``; None if it was made by other packages or lacks states that are wanted."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -117,7 +117,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
             _stop_for(watch.see(frame.number, frame.surface, frame.points if len(frame.points) else None))
 
     if watch is not None:
-        list(seen(watch, writer.folder, writer.frames))  # those stored by an earlier process
+        list(seen(watch, writer.folder, writer.frames))  # the frames stored by an earlier process
     forget_peak_memory()
     clock, began = MachineTime.now(), time.process_time()
     try:
@@ -131,7 +131,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
     processor, cost = time.process_time() - began, outcome.cost
     if (
         "seconds_compile" in cost
-    ):  # compilation does not count; the rest takes at most as much processor time as clock time
+    ):  # compilation does not count; everything else takes at most as much processor time as clock time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})

@@ -20,7 +20,7 @@ from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
 LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far the arms depend on it
-_EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and in which a bone turns by 1 rad
+_EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and for a turn of a bone by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)
@@ -60,7 +60,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
     """The arms of a case beside each of its experiments, as far as its run went; InputError where that is less than 1 rad."""
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
-    common = min(len(angles), len(others))  # both begin at the same angle
+    common = min(len(angles), len(others))  # both runs begin at the same angle
     coarser = larger.mean(axis=1)[:common] - arms.mean(axis=1)[:common]
     reached = f"{angles[0]:g} to {angles[-1]:g} degrees"
     setting, records = f"{wanted.tet_size:g} mm tetrahedra, not refined, {reached}", experiments.experiments()
@@ -131,7 +131,7 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range [mm] of arms, from a file in cm, at the angles of both bounds together."""
+    """The range [mm] of arms from a file in cm, at the angles of either bound that lie within those of both."""
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

@@ -20,16 +20,16 @@ from fem_reference.io import files
 from fem_reference.io.texts import toml_text
 from fem_reference.scenes import casefile
 
-# The units among which one is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
+# The units among which the unit of files is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
 _GUESSED = ("mm", "cm", "m", "in")
 # The range of lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# A muscle's greatest distance from a bone it is attached to, as a share of its length; beyond it they were scaled or moved apart.
+# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater one the files do not fit together.
 _APART = 0.5
-# The share of vertices, those nearest to a bone, that are attached; less where two attachments would share some.
+# The share of vertices that are attached, those nearest to a bone; it is reduced where two attachments would share some.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
-_LONGEST = 60  # characters that are kept of a name unfit for a scene or a file
+_LONGEST = 60  # the number of characters that are kept of a name that is unfit for a scene or a file
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _new(folder: Path) -> Path:
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
-    """The one unit in which the size of each surface is possible; InputError where that leaves no unit or several."""
+    """The only unit in which the size of every surface is possible; InputError where no unit or several ones are."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
         size, (least, most) = diagonal(surface.points), _LONG[kind]
@@ -178,7 +178,7 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
     size = min(float(wanted), float(np.ptp(muscle.points, axis=0).min()) / 2)
     source, moving = _cleaned(Path(muscle.place).name), ends[1].bone
-    others = [bone for bone in bones if bone != moving]  # the motion follows the last bone
+    others = [bone for bone in bones if bone != moving]  # the moving bone comes last, before its motion
     axis, centre = _joint(muscle, bones, ends)
     surfaces = "\n".join(
         f'[[bone]]\nname = {toml_text(bone)}\nsurface = {toml_text(paths[bone])}\nunit = "mm"\n'

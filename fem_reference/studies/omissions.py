@@ -29,7 +29,7 @@ from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
-# A run with something left out may take this many times as long as the whole, plus a time [s] to compile a new form.
+# A run with something left out may take this many times as long as the complete run, plus a time [s] to compile a new form.
 LIMIT, COMPILING = 2.0, 60.0
 
 
@@ -81,7 +81,7 @@ def name_of(effect: Effect) -> str:
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
-    """The optional features of a choice: keys whose default is None, except those that trade accuracy or affect only time."""
+    """The optional features of a choice: keys whose default is None, except those for accuracy against time, or for time only."""
     record = solvers.find(choice.solver, place).settings
     optional = {key for key, entry in record.model_fields.items() if entry.default is None}
     optional -= {*solvers.trades(record), *MACHINE_ONLY}
@@ -89,9 +89,9 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
 
 
 def parts(whole: Trial) -> tuple[LeftOut, ...]:
-    """Everything that can be left out of a trial: each effect of the scene except its material, where the solver simulates effects,
-    else each feature of the solver; and all of them together. Something elastic always remains. Tension at rest is left out along
-    with all that it balances there: effects that act at the first frame, and the support by bones.
+    """Everything that can be left out of a trial: each effect of the scene except its material, if the solver simulates effects,
+    else each feature of the solver; and all of them together. Something elastic always remains. Tension at rest is left out
+    together with all that it balances: effects that act at the first frame, and the support by bones.
     """
     if not solvers.takes_effects(whole.choice.solver):
         found = features(whole.choice, whole.name)
@@ -113,7 +113,7 @@ def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effec
 
 
 def without(whole: Trial, part: LeftOut) -> Trial:
-    """The trial with a part left out, by an element that suits the remaining effects."""
+    """The trial with a part left out, and with an element that suits the remaining effects."""
     kept, choice, instead = _kept(whole.scene, part), whole.choice, dict[str, Any]()
     scene = whole.scene.model_copy(update={"effect": kept}) if part.effects else whole.scene
     element = getattr(solvers.settings(choice, whole.name), "element", None) if part.effects else None
@@ -155,7 +155,7 @@ def _warm_up(case: MuscleCase, store: Path) -> None:
         if solvers.takes_effects(trial.choice.solver):
             continue
         offer = solvers.find(trial.choice.solver, trial.name)
-        with suppress(InputError, MissingSoftware):  # its run reports these
+        with suppress(InputError, MissingSoftware):  # the measured run reports these
             settings = bench.settings(trial.choice, trial.name)
             offer.require(settings)
             built: Any = bench.given(offer, settings)

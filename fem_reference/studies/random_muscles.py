@@ -12,8 +12,8 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
 EVERY = 10  # frame numbers from a pose to the next
-_AROUND, _ALONG = 20, 21  # vertices of every surface, so that vertex i is at the same part of each
-_TETS = 150  # approximate number of tetrahedra, each then cut into eight
+_AROUND, _ALONG = 20, 21  # the vertices around and along every surface; vertex i is at the same part of each
+_TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """
 [[bone]]
@@ -107,7 +107,7 @@ def _drawn(rng: np.random.Generator, surface: Surface, number: int, poses: int) 
     length, side = surface.points[:, 2].max(), surface.points[:, 1].max()
     leans, arm, mu = rng.uniform(0, 2 * np.pi), rng.uniform(12, 30), np.exp(rng.uniform(*np.log([10, 40])))
     along, centre = [np.cos(leans), np.sin(leans), 0], [-arm * np.sin(leans), arm * np.cos(leans), 0]
-    lower = np.degrees(length / arm) * rng.uniform(-0.02, 0.1, poses)  # the middle is stretched by a tenth at most
+    lower = np.degrees(length / arm) * rng.uniform(-0.02, 0.1, poses)  # stretches the middle line by a tenth at most
     found: dict[str, object] = {"mu": f"{mu:.4g}", "lower": _turn(along, centre, lower)}
     found |= {"upper": "", "obstacle": "", "effects": ""}
     axis, upper = rng.normal(size=3), rng.uniform(-10, 10, poses)

@@ -35,10 +35,10 @@ _EXACT = "exact attachments"
 # Files whose code makes error bars, beside the metrics.
 _MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
 
-# The coarse run of a scene with refined tetrahedra omits the last refinement; that of another scene has its own mesh, with
+# The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with
 # tetrahedra larger by this factor.
 RATIO = 1.5
-# Error bars are made unasked if they take at most this share of the time of the reference, estimated by numbers of tetrahedra.
+# Error bars are made without request if they take at most this share of the reference's time, estimated by numbers of tetrahedra.
 CHEAP = 0.2
 
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
@@ -48,9 +48,9 @@ Vary = Callable[[MuscleCase], MuscleCase]
 
 
 def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touched: bool = True) -> dict[str, Vary]:
-    """Changes, by name, that each halve one cause of numerical error beside tetrahedra: compliance and smoothing of contact with
-    bones, if one ``pressed``, and of the muscle with itself, if it ``touched`` itself; error and rounding of distances to bones;
-    load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
+    """Changes, by name, each of which halves a cause of numerical error other than tetrahedra: compliance and smoothing of contact
+    with bones, if one ``pressed``, and of self-contact, if the muscle ``touched`` itself; error and rounding of distances to
+    bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
     found, bones = dict[str, Vary](), among(case.effects) if pressed else None
     itself = touching.among(case.effects) if touched else None
@@ -171,8 +171,8 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 
 def safety(bench: Bench[MuscleCase]) -> float:
     """The factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
-    smallest attachment, if that is above 1. Nested tetrahedra share its polygonal outline, so their difference does not show its
-    error.
+    smallest attachment if that ratio is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
+    difference does not show its error.
     """
     rest, radii = bench.setup(), [math.inf]
     for entry in rest.attached:
@@ -211,7 +211,7 @@ def _of(reference: Run) -> dict[str, str]:
 
 @cache
 def _measuring_hash() -> str:
-    """A hash over the source files that measure the runs."""
+    """A hash over the source files by which runs are measured."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *map(Path, _MAKING)):
         digest.update(path.read_bytes())
@@ -230,7 +230,7 @@ def body_bars(solved: Run) -> BodyBars | None:
         log.info("error bars: none, of a body that did not converge")
         return None
     settings, body = solved.settings, solved.body
-    assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
+    assert isinstance(settings, fenicsx.BodySettings)  # FEniCSx solved the body
     assert body is not None
     other, shared, changes, sharper = sharper_problem(body, settings)
     log.info("error bars: solving with %s", sharper)
@@ -245,12 +245,12 @@ def body_bars(solved: Run) -> BodyBars | None:
 def sharper_problem(
     body: Body, settings: fenicsx.BodySettings
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
-    """A more accurate problem: its body, indices of the points of ``body`` in it, changed settings, and the changes in words."""
+    """A more accurate problem: its body, the indices in it of the points of ``body``, changed settings, and changes in words."""
     changes: dict[str, float | str | None] = {"store_state": False}
     said = ""
     if body.rubs or any(
         "interval" in effect.needs for effect in body.effects
-    ):  # else a state does not depend on load steps
+    ):  # in all other cases a state does not depend on load steps
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
         changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
         said = " and load steps of half the length"

@@ -28,16 +28,16 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Cases of our own, which need no data, then those of the report's anatomy, in the order of their cost.
+# Cases of our own, which need no data, then cases with the report's anatomy, in the order of their cost.
 CASES = (
     *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
     *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
 )
 # The processor time [s] that a solver may take on a case.
 TIME_LIMIT = 600.0
-# The machine of frames submitted with their time.
+# The entry for the machine where frames were submitted with their time.
 THEIRS = "as stated by its authors"
-# The distance [mm] (rms) from rest up to which the reference counts as back at the last frame; then that of solvers is measured.
+# The distance [mm] (rms) from rest up to which the reference counts as back at the last frame; only then solvers' are measured.
 _BACK = 0.1
 # The metrics of all rows; the joint moment only where a solver has forces.
 _METRICS = (*in_tables(), "joint_moment")
@@ -45,8 +45,8 @@ _METRICS = (*in_tables(), "joint_moment")
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it ``takes``; for frames
-    the only ``case`` that they are of, empty for all, and the key ``scene`` of its export, empty if unknown.
+    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it models (``takes``);
+    for submitted frames their only ``case``, empty for all, and the key ``scene`` of its export, empty if unknown.
     """
 
     candidate: Candidate
@@ -118,7 +118,7 @@ def stand(
 
 
 def _check_names(entrants: Sequence[Entrant]) -> None:
-    """InputError where two entrants of one name have a case in common."""
+    """InputError where two entrants with the same name have a case in common."""
     cases = dict[str, list[str]]()
     for one in entrants:
         others = cases.setdefault(one.candidate.name, [])
@@ -191,7 +191,7 @@ class _Measured:
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
         """The row of a run of this ``key``; late where it took more than the time limit, even if stored under another limit."""
         own = run is self.reference
-        submitted = one.candidate.solver == "recorded"  # its time was measured on another machine
+        submitted = one.candidate.solver == "recorded"  # then its time was measured on another machine
         limit = None if own or submitted else self.bench.time_limit
         late = limit is not None and run.outcome.cost.get("seconds_processor", 0.0) > limit
         status = "timed out" if late and run.outcome.status == "converged" else run.outcome.status

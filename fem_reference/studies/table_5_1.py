@@ -22,8 +22,8 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own, which need no data, and the five of the report (6.1.3 to 6.1.6). The iliacus has its anatomical attachments here: with
-# those of the report's program it has no solution beyond frame 77 (see the case).
+# Our own scenes, which need no data, and the five of the report (6.1.3 to 6.1.6). The iliacus has its anatomical attachments here:
+# with those of the report's program it has no solution beyond frame 77 (see the case).
 SCENARIOS = (
     "hip_flexion",
     "box_squeeze",
@@ -42,8 +42,8 @@ _AVOIDS = ("collision", "contact", "voxels")  # settings with which a solver avo
 def stand(
     scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]], *, error_bars: bool = False
 ) -> Table:
-    """The table over ``scenes``, with runs in ``store``; frames of ``foreign`` solvers, by case, are read first. The reference
-    has the ``error_bars`` that are stored, else new ones where asked.
+    """The table over ``scenes``, with runs in ``store``; frames of ``foreign`` solvers, by case, are read first. The reference has
+    its stored error bars, if any, else new ones if ``error_bars``.
     """
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
@@ -127,7 +127,7 @@ def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -
 
 
 def stated(record: Record) -> int:
-    """The values of a ``record`` that are required or differ from its defaults; those of inner records one by one."""
+    """The number of values of a ``record`` that are required or differ from defaults; values of inner records count one by one."""
     fields = type(record).model_fields.items()
     given = [(field, getattr(record, key)) for key, field in fields]
     return sum(_leaves(value) for field, value in given if field.is_required() or value != field.default)
@@ -156,8 +156,8 @@ def _result(
 
 
 def seconds_of(run: Run) -> float | None:
-    """The time [s] per frame number, where a solver computes each or its ``candidate.toml`` states it; else per wanted frame; None
-    where it is unknown.
+    """The time [s] per frame number if the solver computes each number or its ``candidate.toml`` states that time, else per wanted
+    frame; None where it is unknown.
     """
     cost = run.outcome.cost
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))

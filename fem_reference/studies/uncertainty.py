@@ -24,7 +24,7 @@ from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
-# The quantities with a band, beside the surface and forces, where a case has them.
+# The quantities with a band, besides the surface and forces, where a case has them.
 QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")
 SURFACE = ("surface_deviation", "rms")
 FORCE = "force on "
@@ -35,7 +35,7 @@ def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int 
     where no parameter has a range.
     """
     varied = unknowns(case)
-    case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # nothing is judged
+    case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # as nothing is to be judged
     points = sampled(len(parameters), runs, seed)
     trials = [_trial(varied, parameters, point) for point in points]
     title, size = varied.whole.title, varied.whole.muscle.tet_size / 2**varied.whole.muscle.refinements
@@ -132,7 +132,7 @@ def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal
 
 
 def _beside(comparison: Comparison, found: Sequence[Band]) -> Iterator[tuple[Run, Band, Floats]]:
-    """Each candidate with each band that was not refused and its own values (f,) of the quantity."""
+    """Each candidate with each band that was not refused, and the candidate's values (f,) of the quantity."""
     for run in comparison.candidates:
         for band in found:
             metric, _, statistic = band.quantity.partition(".")

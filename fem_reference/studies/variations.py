@@ -25,7 +25,7 @@ from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase, VertexList
 
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
-# Sizes of tetrahedra, in those of the case, at each number of refinements up to its own.
+# Sizes of tetrahedra relative to the case's, each with every number of refinements up to the case's own.
 _SIZES = (2.0, 1.6, 1.25, 1.0)
 # The reference's settings are varied on the mesh before the last refinement or, without refinement, on tetrahedra of this factor.
 _COARSER = 1.6
@@ -89,7 +89,7 @@ def nearest_vertices(surface: Surface, points: Floats) -> Floats:
 
 
 def carried(run: Run, surface: Surface) -> Run:
-    """A ``run`` on another surface, carried to the vertices of ``surface`` by the same extension as to fibres."""
+    """A ``run`` on another surface, carried to the vertices of ``surface`` by the same extension by which fibres are carried."""
     if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
         return run
     extension = Extension.to(surface.points, run.surface)
@@ -99,7 +99,7 @@ def carried(run: Run, surface: Surface) -> Run:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run to be made of a ``scene`` by a ``choice`` of solver: its ``name``, the varied key (``knob``) and its ``value``, and the
+    """A run to be made on a ``scene`` by a ``choice`` of solver: its ``name``, the varied key (``knob``) and its ``value``, and the
     ``changed`` keys of the scene, as scene files write them.
     """
 

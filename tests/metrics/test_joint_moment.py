@@ -101,7 +101,7 @@ def test_differences_and_missing_forces() -> None:
     assert measure(run, bare, context(run), ["joint_moment"]) == ()  # no deviation from forces that are not known
     with pytest.raises(InputError, match='bone: got "tibia", want one of femur'):
         run.force("tibia")
-    with pytest.raises(InputError, match="no force is known"):
+    with pytest.raises(InputError, match="this run has no forces"):
         bare.force("femur")
 
 

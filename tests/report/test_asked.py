@@ -72,7 +72,7 @@ def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypa
     assert call("run") == [page("bar-reference")]
     monkeypatch.setattr(demo, "MAIN_JOB", str(case))
     assert cli.main(["demo", "--out", str(out), "--quiet"]) == cli.DONE  # it is the same as to compare
-    assert "written anew" in capsys.readouterr().out
+    assert "replaces the page that the same command made" in capsys.readouterr().out
     assert call("compare", "--set", "frames.every=10") == [page("bar-frames.every=10")]
     assert call("run", "--negative-control") == [page("bar-negative_control-reference")]
     assert call("compare", "--name", "mine") == [page("mine")]

@@ -98,7 +98,9 @@ def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     assert "fail: positions.moved unchanged at frame 20: 3 mm from the baseline, 0.1 mm allowed" in lines
     away = [line for line in lines if "surface_deviation.max unchanged" in line]
     assert away[0].endswith("mm, further from the reference")
-    assert any(line.startswith("to see which statistics are nearer or further away: compare ball") for line in lines)
+    assert any(
+        "or further from it, run: ./fem compare ball --candidate ... --against BASELINE" in line for line in lines
+    )
     unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is within it of the 0.1 mm allowed"
     assert f"{unknown} (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"

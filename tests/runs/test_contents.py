@@ -64,7 +64,7 @@ def test_what_is_amended_leaves_the_rest(tmp_path: Path) -> None:
 
 def test_frames_between_whole_numbers_share_no_file() -> None:
     assert frame_file(10.0, ".vtp") == frame_file(10, ".vtp") == "frame_0010.vtp"
-    with pytest.raises(ValueError, match=r"frame 0\.2, which is no whole number, has no file"):
+    with pytest.raises(ValueError, match=r"frame 0\.2 has no file, as its number is not whole"):
         frame_file(0.2, ".vtp")
 
 

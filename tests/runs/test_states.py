@@ -123,5 +123,5 @@ def test_there_is_one_value_a_node(tmp_path: Path) -> None:
     """A square of two triangles has 4 vertices and 5 edges."""
     (tmp_path / states.FIELD).mkdir()
     write_arrays(tmp_path / states.FIELD / "frame_0000.npz", WHOLE | {"psi": np.zeros(7)})
-    with pytest.raises(InputError, match=r"frame_0000\.npz: got 7 values, want 4 or 9, one a node"):
+    with pytest.raises(InputError, match=r"frame_0000\.npz: got 7 values, want 4 or 9, one for each node"):
         states.read_field(tmp_path, (0,))

@@ -17,12 +17,12 @@ from fem_reference.io.soup import Soup
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh format, known by the ``suffixes`` of its files, lower case, with their dots.
+    """A mesh format, known by the ``suffixes`` of its files, in lower case with their dots.
 
-    ``read``: points and triangles as in the file; raises any exception where the file is incomplete. ``write``: the surface
-    and its displacement (n, 3) [mm], if the format has point data; None where the format can only be read.
-    ``shares_points``: whether triangles index a common list of points, whose order is kept; else each has three own points.
-    ``states_size``: whether a file states its size; else truncation between two of its lines goes unnoticed.
+    ``read``: returns points and triangles as in the file; raises any exception where the file is incomplete. ``write``: writes the
+    surface and, if the format has point data, its displacement (n, 3) [mm]; None where the format can only be read.
+    ``shares_points``: True where triangles index a common list of points, whose order is kept; else each has its own three points.
+    ``states_size``: True where a file states its size; else truncation between two of its lines goes unnoticed.
     """
 
     suffixes: tuple[str, ...]

@@ -16,13 +16,13 @@ _TYPES = {
     "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",
     "vtktypeuint64": "u8", "vtkidtype": "i4", "float": "f4", "double": "f8",
 }  # fmt: skip
-# Attributes with a fixed number of components; the third word of their line is the type.
+# The number of components of attributes for which it is fixed; the third word of their line is the type.
 _COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6}
 _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file, of which other sections are skipped; ValueError or another exception where it is incomplete."""
+    """The data set of a file; other sections are skipped. ValueError or another exception where it is incomplete."""
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no head of a VTK file")
@@ -49,7 +49,7 @@ def read(data: bytes) -> DataSet:
 
 
 class _File:
-    """The bytes of a file, text or binary, read from ``at``; ``values`` is the number of points or cells with attributes."""
+    """The bytes of a file, text or binary, read from ``at`` on; ``values``: the number of points or cells that attributes have."""
 
     def __init__(self, data: bytes, at: int, *, text: bool) -> None:
         self.data, self.at, self.text, self.values = data, at, text, "0"

@@ -22,12 +22,12 @@ _KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells"
 _TYPES = {"Float32": "f4", "Float64": "f8"}
 _TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
 _END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-# The most bytes of an array that was compressed.
+# The most bytes of a compressed array once it is expanded.
 _MOST = 2**28
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file, its pieces as one; ValueError or another exception where it is invalid or incomplete."""
+    """The data set of a file, with its pieces joined; ValueError or another exception where it is invalid or incomplete."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
@@ -73,7 +73,7 @@ def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[I
 
 
 class _Arrays:
-    """The arrays of a file with a ``root`` and ``appended`` data, which begin after the name of their element."""
+    """The arrays of a file with a ``root`` element and ``appended`` data, which begin after the tag of their element."""
 
     def __init__(self, root: Element, appended: bytes) -> None:
         self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
@@ -101,7 +101,7 @@ class _Arrays:
         return np.frombuffer(self._bytes(data, _decoded if encoded else _taken), self.order + kind)
 
     def _bytes(self, data: memoryview, take: Callable[[memoryview, int], bytes]) -> bytes:
-        """Bytes stored at the beginning of ``data``, after a header with their length, or with those of compressed blocks."""
+        """Bytes stored at the beginning of ``data``, after a header with their number or with the lengths of compressed blocks."""
         size = self.header.itemsize
         if not self.compressor:
             (count,) = np.frombuffer(take(data, size), self.header).tolist()
@@ -143,7 +143,7 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
         return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 
 
-# The bytes of a packed block of a wanted length; at most one more, which shows that it is too long.
+# Functions that unpack a block to a wanted length; they return at most one byte more, which shows that the block is too long.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
     "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most + 1),
     "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most + 1),

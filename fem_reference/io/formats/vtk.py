@@ -15,14 +15,14 @@ from fem_reference.io.soup import DataSet, Soup, check_lengths, joined, only_tri
 
 _TRIANGLE = 5  # of VTK's cell types
 _NO_ROOM = 20007  # VTK's number for a full disk; other errors of the system keep their numbers
-LINES = (".vtk", ".vtp")  # the formats that have polylines
+LINES = (".vtk", ".vtp")  # the suffixes of the formats that have polylines
 _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}
 
 
 @dataclass(frozen=True, eq=False)
 class DataBlock:
-    """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines; by name arrays ``of_points``
-    (n, ...), ``of_cells`` (m, ...), and ``numbers`` of the whole block.
+    """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines. By name, arrays ``of_points``
+    (n, ...) and ``of_cells`` (m, ...), and ``numbers`` for the whole block.
     """
 
     points: Floats
@@ -50,7 +50,7 @@ def _read(path: Path) -> Soup:
 
 
 def read_lines(path: Path, *, moved: bool) -> tuple[Floats, list[list[int]]]:
-    """Points (n, 3) of the file and the points of each line; ValueError for a line of one point, and if not ``moved`` for a point
+    """Points (n, 3) of the file and the points of each line. ValueError for a line of one point and, unless ``moved``, for a point
     that is not finite or a line without length.
     """
     data = data_set(path)
@@ -81,14 +81,14 @@ def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floa
 
 
 def _finish(kind: str, path: Path, data: Any) -> None:
-    """Write by a writer of pyvista of this ``kind``, without messages of VTK; OSError where that fails."""
+    """Write ``data`` by VTK's writer of a ``kind``, without its messages; OSError where that fails."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         writer = getattr(pyvista, kind)(path, data)
         if path.suffix.lower() == ".vtk":
             writer.writer.SetFileTypeToBinary()
-        else:  # in the other modes a displacement that is not finite cannot be read again
+        else:  # in the other modes of VTK a displacement that is not finite cannot be read back
             writer.writer.SetDataModeToAppended()
         writer.write()
     if code := writer.writer.GetErrorCode():

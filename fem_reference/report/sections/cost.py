@@ -13,7 +13,7 @@ from fem_reference.report.drawings import REFERENCE, Drawing, drawn
 from fem_reference.report.words import under_load, words
 from fem_reference.runs.store import Run
 
-# Scalars of a run that are costs of a frame, and their words.
+# Scalars of a run that are costs of a frame, with their names on the page.
 _BY_FRAME = {
     "seconds_processor": "processor time [s]",
     "newton_iterations": "Newton iterations",

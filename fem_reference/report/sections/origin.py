@@ -12,7 +12,7 @@ from fem_reference.scenes.case import Case
 
 
 def facts(comparison: Comparison) -> dict[str, Any]:
-    """Origins as one table each, and the scene."""
+    """The origin of each run as a table, and the scene."""
     path = Path(comparison.scene.place)
     tables = [{key: value for key, value in run.origin.items() if key != RECORD} for run in comparison.runs]
     origins = [(run, _flat(table)) for run, table in zip(comparison.runs, tables, strict=True)]
@@ -40,7 +40,7 @@ def changes(case: Case) -> list[tuple[str, Any, Any]]:
 
 
 def _table(case: Case) -> dict[str, Any]:
-    """The case as nested tables, with list entries by number, and with all effects of its file even where it chose among them."""
+    """The case as nested tables, with entries of lists by number, and with all effects of its file even if it leaves some out."""
     effects = [one.effect for one in case.decisions] or case.effects
     listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
     listed |= {"choice": "auto"} if case.decisions else {}

@@ -19,7 +19,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import MOST_FRAMES
 from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 
-# Fractions of a frame at which motions are sampled; a bone that turns too far between these also does between finer ones.
+# Fractions of a frame at which motions are sampled to find bones that turn too far from one sample to the next.
 _PARTS = 16
 
 
@@ -32,7 +32,7 @@ class FrameModel(Protocol):
     advice: str
 
     def move(self, number: int, /) -> None:
-        """Advance to the frame ``number``; this time counts as solving."""
+        """Advance to the frame ``number``; the time of this call counts as solving."""
 
     def trouble(self) -> Trouble | None:
         """The trouble with the present state; None without."""
@@ -46,7 +46,7 @@ class FrameModel(Protocol):
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
     """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
-    parts, at whose ends the model sees the bones. ``sink`` gets the frames. *Out of steps* where bones move too far in a part.
+    parts, at whose ends it takes the poses of bones. ``sink`` gets the frames. *Out of steps* where bones move too far in a part.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:

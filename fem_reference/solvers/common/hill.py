@@ -28,8 +28,8 @@ _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
 # Fibres are sought between these lengths in steps of at most this; velocities are found to this share of F0.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
-_SLACK = 1e-9  # strain, below which round-off does not strain a tendon
-_LEAST = 1e-3  # activation, without which no velocity follows from a force
+_SLACK = 1e-9  # a tendon with less strain than this, which may be round-off, is slack
+_LEAST = 1e-3  # the least activation for which a velocity follows from a force
 
 
 class Hill(Record):
@@ -62,18 +62,18 @@ class Hill(Record):
         return tendon((path - along) / self.slack_length - 1)
 
     def imbalance(self, path: float, fibre: float, activation: float) -> float:
-        """The force [F0] of fibres at rest along the tendon less that of the tendon."""
+        """The force [F0] of resting fibres along the tendon minus the force of the tendon."""
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
         """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
-        tendon has no force. InputError where fibres would be shorter than a tenth.
+        tendon has no force. InputError where fibres would be shorter than a tenth of their optimal length.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
             return 0.0, low
         high = min(self._fibre(path, -_SLACK), _LONGEST)
-        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # where the tendon pulls harder than fibres can
+        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # below, the tendon pulls harder than fibres can
         lengths = np.linspace(low, high, 2 + int((high - low) / _STEP))
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
@@ -108,7 +108,7 @@ class Hill(Record):
             return [-self.velocity(path, float(fibre[0]), activation)]
 
         lengths = [first]
-        for start, end in pairwise(times):  # the slopes of paths and activations differ between intervals
+        for start, end in pairwise(times):  # one by one, as slopes of paths and activations jump between intervals
             found = scipy.integrate.solve_ivp(
                 rate, (start, end), [lengths[-1]], method="LSODA", rtol=tolerance, atol=tolerance
             )
@@ -180,9 +180,9 @@ def hyperbola(velocity: float, curvature: float) -> float:
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The velocity of shortening, as a share of the greatest, at a ``force``; beyond the hyperbola's ends along its tangents."""
+    """The velocity of shortening, as a share of the greatest, at a ``force``; tangents continue the hyperbola beyond its ends."""
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
-    if force < 0:  # shortens faster than without load
+    if force < 0:  # shortening faster than without load
         return 1 - force * (1 + 1 / curvature)
     if force <= 1:
         return (1 - force) / (1 + force / curvature)

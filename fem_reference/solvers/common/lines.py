@@ -17,7 +17,7 @@ from fem_reference.foundations.units import Angle, Point
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone, Joint
 
-# An angle [rad] this much out of a range is at its end, but for rounding.
+# An angle out of a range by less than this [rad] is at its end, up to rounding.
 _ROUNDING = 1e-9
 
 
@@ -31,7 +31,7 @@ class CurvePoint(Record):
 class Via(Record):
     """A point of every fibre that moves with a ``bone``; at rest it is ``at`` this share of the fibre's length.
 
-    ``within``: the least and the greatest angle of the ``joint`` at which lines pass the point; at others they leave it out.
+    ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; else they leave it out.
     ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them Catmull-Rom splines, whose
     slopes are those of parabolas through neighbours; beyond them the nearest position. ``at`` then only orders the points.
     """
@@ -90,7 +90,7 @@ class Passed:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A line for each of k fibres of ``sizes`` (k,) points, made of p parts between fixed points, after the shares ``places``.
+    """A line for each of k fibres of ``sizes`` (k,) points, in p parts between fixed points at the shares ``places`` of its length.
 
     ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1); ``guided``: those that depend on a joint.
     """
@@ -138,7 +138,7 @@ def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: 
 
 
 def along(points: Floats, places: list[float]) -> Floats:
-    """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
+    """The points (k, 3) at the shares ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     wanted = np.array(places) * travelled[-1]
     return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
@@ -146,16 +146,16 @@ def along(points: Floats, places: list[float]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
-    """Part, counted line by line, and share of it for the points of lines of these ``sizes``."""
+    """The part on which each point of lines of these ``sizes`` lies, counted line by line, and the share of the part before it."""
     part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
     return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """Part and share of it (count,) for each point of a line: fixed points among them, the others evenly in between."""
+    """The part and the share of it (count,) for each point of a line: fixed points, and the others evenly between them."""
     at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
     steps = np.arange(len(at))
-    at = np.maximum.accumulate(at - steps) + steps  # at least one point further each
+    at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the one before
     at = np.minimum(at, count - 1 - steps[::-1])
     part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]

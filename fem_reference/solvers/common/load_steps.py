@@ -13,8 +13,8 @@ GROWTH = 1.5
 
 @dataclass(frozen=True)
 class Attempt:
-    """The record of a Newton solve at one load: its ``status``, which ends the run if the solve failed; the number of
-    ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each; and, of a failure, a
+    """The record of a Newton solve at one load: its ``status``, which is that of the run if the solve fails finally; the number of
+    ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each one; for a failure a
     ``detail``: a sentence that begins with its subject.
     """
 
@@ -25,11 +25,11 @@ class Attempt:
 
     @property
     def converged(self) -> bool:
-        """True where a state in equilibrium was found and no check refused it."""
+        """True where an equilibrium was found and no check refused it."""
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """The attempt, which converged, as a failure because a check refuses its state."""
+        """The converged attempt as a failure, as a check refuses its state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
@@ -71,9 +71,9 @@ def march(
     last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (at rest, or where the run continues) through every frame. ``attempt`` solves at a load from the last
-    converged state, and must restore that state where it fails. A frame whose earlier state ``recall`` can take up needs no step.
-    Before giving up, the loop asks ``last_resort`` to change the solution method; if it returns True, load steps begin again.
-    The loop ends after the first frame that cannot be reached.
+    converged state, and must restore that state where it fails. A frame for which ``recall`` finds an earlier state needs no step.
+    Before giving up, the loop calls ``last_resort`` to change the solution method; if that returns True, it tries the load steps
+    again. The loop ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)

@@ -16,11 +16,11 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# Limit of clock time over that of processor time: beyond it the machine is too busy, or the program waits.
+# The limit of clock time over the limit of processor time: beyond it the machine is too busy, or the program waits.
 CLOCK = 10
-# Time [s] between two looks at a program: this share of its time so far, but at least and at most these.
+# The time between two looks at a program: a share of its time so far, but at least and at most these times [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)
-_TAIL = 4096  # bytes that are read from the end of its output
+_TAIL = 4096  # the number of bytes that are read from the end of a program's output
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def found(word: str, directory: Path) -> Path | None:
 
 
 def modules(folder: Path) -> set[Path]:
-    """The Python files in a ``folder`` and below it, but for caches, hidden folders and virtual environments."""
+    """The Python files in a ``folder`` and below it, except in caches, hidden folders and virtual environments."""
     found = set[Path]()
     for place, folders, names in folder.walk():
         inner = [name for name in folders if name != "__pycache__" and not name.startswith(".")]
@@ -80,7 +80,7 @@ def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[
     )
     try:
         yield process
-    except BaseException:  # it still runs: the limit of somebody else, or an interruption
+    except BaseException:  # the process still runs: a caller's limit or an interruption ended the wait
         _kill(process.pid)
         process.wait()
         raise
@@ -90,7 +90,7 @@ def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[
 
 
 def _kill(process: int) -> None:
-    """Kill a process that runs and all that descend from it, in sessions of their own too."""
+    """Kill a running process and all its descendants, also those in sessions of their own."""
     for number in processor_times(process) or (process,):
         with suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)

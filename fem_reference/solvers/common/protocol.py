@@ -19,12 +19,12 @@ Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 # Solves a problem of one type: sinks every requested frame as it is reached. A physical failure is a status with a sentence, never
 # an exception; earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
 type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
-# Continues a run that was cut off: from the last stored frame with enough state, which need not be the last, else from the first;
-# ends as the run would have ended.
+# Continues a run that was cut off, from the last stored frame with a complete state, else from the first frame; ends as the
+# uninterrupted run would have ended.
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
-# Raises InputError below a place where the settings do not suit the effects of a scene.
+# Raises InputError, with a key below a given place, where the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
-# Raises InputError below a place where the settings do not suit the bones, attachments, fibres or boundary of a case.
+# Raises InputError, with a key below a given place, where settings do not suit bones, attachments, fibres or boundary of a case.
 type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
@@ -77,10 +77,10 @@ class Solver[P, S: Record]:
 
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
-    """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``:
-    for a solver that simulates the effects of a scene, else None; ``fibres``: True where a surface solver needs fibres under such
-    settings. Without them it receives a ``Setup``, as the muscle is not filled for it. ``depends_on``: the order of vertices or
-    the size of the muscle, if these alone change its answer.
+    """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``: None
+    unless it simulates the effects of a scene; ``fibres``: True where a surface solver needs fibres under such settings; otherwise
+    it receives a ``Setup``, as the muscle is not filled with tetrahedra for it. ``depends_on``: the order of vertices or the size
+    of the muscle, if these alone change its answer.
     """
 
     task = "solve"

@@ -9,11 +9,11 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, enclosed_volume
 from fem_reference.runs.contents import Status
 
-# A body this many times as wide as at rest, or as its attached part, has diverged.
+# A body has diverged if it is wider than this many times its width at rest and the present width of its attached part.
 _WIDE = 10.0
-# A body of this many times its volume has diverged too. Flesh keeps its volume within a few percent, and a surface that keeps only
-# its dihedral angles reached twice its volume; a wrong root or scaling has no such bound. A body that the bones stretch to n times
-# its length may have n times that.
+# A body has diverged too if it encloses this many times its volume. Flesh keeps its volume within a few percent, and a surface that
+# keeps only its dihedral angles reached twice its volume; with a wrong root or scaling there is no bound. For a body that the bones
+# stretch to n times its length the limit is n times as great.
 _LARGE = 5.0
 
 
@@ -45,8 +45,8 @@ class SurfaceCheck:
         self.width, self.volume = diagonal(rest.points), enclosed_volume(rest.points, rest.triangles)
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged where a position is not a number, or the surface is much wider or larger than at rest and than its attached
-        vertices are apart; inverted where it is turned inside out.
+        """Diverged where a position is not a number, or the surface is much wider than at rest and than its attached vertices
+        are apart, or much larger than at rest; inverted where it is turned inside out.
         """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):

@@ -20,7 +20,7 @@ from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
 from fem_reference.solvers.common.lines import index
 
-# A fixed point this deep [mm] in an obstacle is on its surface, but for rounding.
+# A fixed point in an obstacle by less than this [mm] is on its surface, up to rounding.
 _TOUCHES = 1e-6
 
 

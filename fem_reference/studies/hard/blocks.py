@@ -26,10 +26,10 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 
 # The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
-_LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
-# The bones of held faces are balls: their radius and distance in sizes of the block; nothing meets them there.
+_LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
+# The bones of held faces are balls, far from everything: their radius and distance in sizes of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # of the block's size: the rounding between equal motions of two holds
+_SAME = 1e-9  # the rounding between equal motions of two holds, as a share of the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -61,7 +61,7 @@ def problem(hard: Hard) -> MuscleProblem:
 
 
 def several(hard: Hard) -> MusclesProblem:
-    """The problem of the block of ``hard`` and the bodies beside it, any two of which may touch where that acts."""
+    """The problem of the block of ``hard`` and the bodies beside it; any two may touch if contact between them acts."""
     law, apart = touching_among(hard.effect), dict[str, MuscleProblem]()
     parts = {FIRST: hard}
     for one in hard.beside:
@@ -70,7 +70,7 @@ def several(hard: Hard) -> MusclesProblem:
     for name, part in parts.items():
         acting = tuple(effect for effect in part.effect if not isinstance(effect, MuscleContact))
         apart[name] = _named(name, problem(part.model_copy(update={"effect": acting})))
-    # All have all bones, as the muscles of a scene.
+    # Each block has all bones, like the muscles of a scene.
     held = tuple(entry.bone for one in apart.values() for entry in one.attached)
     bones = (*held, *next(iter(apart.values())).bones[len(hard.hold) :])
     pairs = tuple(combinations(apart, 2)) if law else ()
@@ -85,7 +85,7 @@ def _named(name: str, one: MuscleProblem) -> MuscleProblem:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A block about its ``middle`` (3,) [mm], its cells of a size of ``cell`` [mm], moved as ``start`` describes."""
+    """A block about its ``middle`` (3,) [mm] with cells of size ``cell`` [mm], moved as ``start`` describes."""
 
     start: Start
     middle: Floats
@@ -172,7 +172,7 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
 
 
 def _lines(block: Lattice) -> Polylines:
-    """Straight lines through the block along its fibres' greatest axis."""
+    """Straight lines through the block, along the axis nearest to its fibres."""
     axis = int(np.argmax(np.abs(block.fibre)))
     shares = np.empty((_LINES, _POINTS, 3))
     shares[:, :, axis] = np.linspace(0.05, 0.95, _POINTS)

@@ -25,7 +25,7 @@ from fem_reference.studies.hard.records import REFERENCE, SECOND, Hard, Lattice,
 
 _MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
-_CUTS = 64  # the greatest factor by which a load step is cut before it is given up
+_CUTS = 64  # the greatest factor by which a load step is cut before the run gives up
 MOVED = 0.1  # greatest random displacement of points of a block, in cells
 SIZES = 0.03  # greatest relative change of the size of tetrahedra of a shipped case
 LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
@@ -68,9 +68,9 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
         boundary = built.field.fixed[np.isfinite(built.field.fixed)]
         span = boundary.min(), boundary.max()
         return outcome, Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=span)
-    assert muscle is not None  # what is no field
+    assert muscle is not None  # the problem is not one of a field
     rest, mesh = muscle.rest.surface.points, muscle.rest.mesh
-    if as_body and mesh is not None:  # whose surface goes along with the tetrahedra
+    if as_body and mesh is not None:  # a body, whose surface moves with its tetrahedra
         inside = Locator(mesh).embed(rest)
         frames = [replace(one, surface=rest + inside.interpolate(mesh, one.points - mesh.points)) for one in frames]
     if solvers.takes_effects(solver):
@@ -107,7 +107,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
 
 @dataclass(frozen=True)
 class SameEnd:
-    """A comparison of runs that should end alike: ``same``: those that reached the end agree; a ``sentence`` about them."""
+    """A comparison of runs that should end alike: ``same``: True if those that reached the end agree; a ``sentence`` about them."""
 
     same: bool
     sentence: str
@@ -120,7 +120,7 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
+    """Compare runs of the reference to a frame in several numbers of equal load steps with the finest run that got there."""
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}

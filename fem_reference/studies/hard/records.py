@@ -24,10 +24,10 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
+_MOST_CELLS = 50_000  # the most cells of a block, more than any solver solves within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
-LIMIT = 120.0  # [s] of processor time of a run
+LIMIT = 120.0  # the limit of processor time of a run [s]
 _OWN: dict[str, dict[str, Any]] = {
     REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
     SECOND: {},
@@ -75,7 +75,7 @@ class Hold(Record):
 
 
 class OtherBody(Record):
-    """Another body, by its ``name``: a ``block`` with its ``hold``, and the ``effect`` that act in place of those in the first."""
+    """Another body, by its ``name``: a ``block`` with its ``hold``, and the effects (``effect``) in place of the first's."""
 
     name: Name
     block: Lattice
@@ -93,7 +93,7 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case``, with its ``quick`` settings for tests if so, and with ``changes`` of its keys."""
+    """A shipped ``case``, at its size for tests if ``quick``, with ``changes`` of its keys."""
 
     case: str
     quick: bool = False
@@ -106,7 +106,7 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) in which the reference goes to the frame ``until``; all should end alike."""
+    """Numbers of equal load steps (``counts``) in which the reference goes to the frame ``until``; all should reach one state."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
@@ -272,14 +272,14 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
 
 
 def _with_effects(one: Any, where: str) -> Any:
-    """A body beside, with the effects that its table names."""
+    """A body ``beside`` the block, with the effects that its table names."""
     return (
         one | {"effect": casefile.effects(one["effect"], where)} if isinstance(one, dict) and "effect" in one else one
     )
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:
-    """InputError where a solver is named that hard cases are not solved by, or a setting that it has not."""
+    """InputError where a case names a solver that does not solve hard cases, or a setting that a solver lacks."""
     named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
     known = choices() if named or hard.settings else {}
     for key, name in [*named, *((f"settings.{name}", name) for name in hard.settings)]:

@@ -34,12 +34,12 @@ from fem_reference.studies.law_split import LAW
 
 log = logging.getLogger(__name__)
 
-LONGER = 600.0  # [s] of processor time of all runs of a case, in several numbers of load steps or on several meshes
+LONGER = 600.0  # the limit of processor time [s] of a case's runs in several numbers of load steps or on several meshes
 # A place at rest [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
-class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught beside it
+class _Late(Exception):  # noqa: N818 - it is an event in a run, not an error, and caught in this module
     """A run took too much processor time."""
 
 
@@ -75,9 +75,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Run every solver, or ``only`` these, and the user's ``own`` on each case, the reference first, and this also ``in_steps`` and
-    on a number of other meshes, ``jitters``. ``own``: for each, the effects that it models beside a law of the whole muscle, None
-    if unknown.
+    """Run every solver, or ``only`` these, and the user's ``own`` on each case, the reference first and also ``in_steps`` and on a
+    number of other meshes, ``jitters``. ``own``: with each solver, the effects that it models besides a law of the whole muscle,
+    None if unknown.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
@@ -159,7 +159,7 @@ def _limited(seconds: float) -> Iterator[None]:
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     """The cell of a solver that attempts the case."""
     hard, solver = posed.hard, choice.solver
-    if posed.problem.field is not None:  # settings for bodies do not matter there
+    if posed.problem.field is not None:  # settings for bodies do not matter for a field
         choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
     outcome, followed = follow(posed.problem, choice)
     if solver == REFERENCE and posed.problem.field is None and outcome.status == "converged":
