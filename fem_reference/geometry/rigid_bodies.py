@@ -209,7 +209,7 @@ def _orthant(beyond: Floats) -> Sampled:
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for zero), and outer products (n, d, d) of these."""
+    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for zero), and their outer products (n, d, d)."""
     length = np.linalg.norm(vectors, axis=1)
     some = np.eye(vectors.shape[1])[-1]
     unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])

@@ -224,7 +224,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Points and triangles, ``chosen`` edges (k,) cut at ``middles`` (k, 3) moved to ``fine``, and the original triangle of each."""
+    """Points and triangles, the ``chosen`` edges cut at ``middles`` (k, 3) moved to ``fine``, and the original triangle of each."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])

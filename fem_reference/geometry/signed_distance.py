@@ -1,6 +1,6 @@
-"""Signed distance to a body of many triangles: sampled once on a regular grid, and twice differentiable everywhere.
+"""Signed distance to a body with a triangulated surface: sampled once on a regular grid, and twice differentiable everywhere.
 
-Tricubic B-splines interpolate between the nodes, so that gradient and curvature are continuous, as Newton needs for contact.
+Tricubic B-splines interpolate between the nodes, so that gradient and curvature are continuous, as Newton's method requires.
 """
 
 import logging
@@ -30,22 +30,22 @@ from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.kept_meshes import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
-# The distance [mm] outside a grid: far away from everything, but finite.
+# The distance [mm] returned outside a grid: far from everything, but finite.
 FAR = 1e6
-# The most nodes of a grid that is refined for an error: 256 cubed, 134 MB.
+# The largest number of nodes of a grid that ``resolve`` refines: 256 cubed, 134 MB.
 MOST_NODES = 2**24
 # The first grid of ``resolve`` has about this many cells along its longest edge.
 _FIRST_CELLS = 24
-# The distance is exact for this many cells beyond the margin: the influence of an error falls by 73 % per cell of a spline.
+# The distance is exact for this many cells beyond the margin: in a spline the influence of an error falls by 73 % per cell.
 _FORGETTING = 4
 # Every fourth node along an axis is exact everywhere; the others only near the surface.
 _STRIDE = 4
-# Random points around the surface at which the error is sampled, and points in one call of libigl.
+# The number of random points around the surface at which the error is sampled, and of points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
-# Points that are sampled at a time.
+# The number of points sampled at a time.
 _AT_ONCE = 10_000
-# Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
+# The polynomial coefficients for powers 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
 logger = logging.getLogger(__name__)
@@ -56,10 +56,10 @@ class Grid:
     """An obstacle whose signed distance is a tricubic spline.
 
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
-    is valid within ``margin`` [mm] of the surface; farther away it is coarser, and ``FAR`` outside the grid.
+    is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
-    ``mean_error`` [mm] the root mean square there. Farther away, ridges between two near parts are blunted as edges are: by a
-    third of a spacing. The gradient is that of the spline: a unit vector up to a few percent, more on edges.
+    ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are
+    rounded as edges are: by a third of a spacing. The gradient is the spline's: a unit vector up to a few percent, more on edges.
     """
 
     coefficients: Floats
@@ -74,18 +74,18 @@ class Grid:
 
     @cached_property
     def steepest(self) -> float:
-        """A bound of the length of the gradient: along each axis a spline is no steeper than its coefficients."""
+        """A bound of the length of the gradient: along each axis a spline is no steeper than the steps of its coefficients."""
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound of the greatest depth [mm], by the least coefficient; infinite where nodes are too far apart for one."""
+        """A bound of the greatest depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound of the path from points to where the distance is at most ``within`` [mm]."""
+        """A lower bound of the length of paths from points to where the distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
@@ -98,21 +98,21 @@ class Grid:
         return found
 
     def distances(self, points: Floats) -> Floats:
-        """The distance (n,) of :meth:`sample` alone, in half its time."""
+        """The distance (n,) of :meth:`sample` alone, in half the time."""
         found = np.where(np.isfinite(points).all(axis=1), FAR, np.nan)
         for chunk, at in self._inside(points):
             found[chunk] = self._values(at, 1).ravel()
         return found
 
     def _inside(self, points: Floats) -> Iterator[tuple[Ints, Floats]]:
-        """Chunks of the indices of ``points`` (n, 3) inside the grid, with their places in cells from its origin."""
+        """Chunks of the indices of ``points`` (n, 3) inside the grid, with their positions in units of cells from its origin."""
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
         for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
             yield chunk, at[chunk]
 
     def _values(self, at: Floats, orders: int) -> Floats:
-        """The derivatives below ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at places (n, 3) in cells."""
+        """The derivatives below ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at positions (n, 3)."""
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
         x, y, z = (_weights(at[:, axis] - cell[:, axis], orders) for axis in range(3))
@@ -123,7 +123,7 @@ class Grid:
         return np.asarray(values.reshape(-1, orders, orders, orders))
 
     def _interpolate(self, at: Floats) -> Sampled:
-        """Distance and its two derivatives at places (n, 3) in cells from the origin."""
+        """Distance and its two derivatives at positions (n, 3) in units of cells from the origin."""
         values = self._values(at, 3)
         curvature = np.empty((len(at), 3, 3))
         for i, j in np.ndindex(3, 3):
@@ -133,7 +133,7 @@ class Grid:
 
 
 def _weights(within: Floats, orders: int) -> Floats:
-    """The value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell ``within`` (n,) it, 0 to 1."""
+    """The value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell at ``within`` (n,), 0 to 1."""
     one, none = np.ones_like(within), np.zeros_like(within)
     found = [np.stack([one, within, within**2, within**3], axis=1)]
     if orders > 1:
@@ -144,10 +144,10 @@ def _weights(within: Floats, orders: int) -> Floats:
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
     """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
-    [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as in ``check_closed``.
+    [mm] of it. Single triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
 
-    ``rounding`` is the standard deviation s [mm] of a Gaussian mean of the distance, as contact does not slide smoothly along
-    flat triangles; where the surface has a mean curvature of 1/r, it moves inward by s^2/r. It counts as error.
+    ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, as contact does not slide smoothly along
+    flat triangles; a surface with a mean curvature of 1/r moves inward by s^2/r. This shift is part of the error.
     """
     check_finite(surface)
     outward, _ = igl.bfs_orient(surface.triangles)
@@ -163,10 +163,10 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
     """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
-    reached; its own ``mean_error`` is the result.
+    reached; the grid's ``mean_error`` tells what was reached.
 
-    The largest error is no suitable measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to
-    the spacing, and in a slit narrower than a cell not at all.
+    The largest error is not a suitable measure: on sharp edges and thin rims, which a grid rounds, it decreases only in proportion
+    to the spacing, and in a slit narrower than a cell not at all.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -180,7 +180,7 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, kept in ``folder`` under a hash of all that it depends on."""
+    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that it depends on."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 
@@ -197,13 +197,13 @@ def _grid(arrays: dict[str, Any]) -> Grid:
 
 
 def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tuple[int, ...]]:
-    """The first node (3,) [mm] of a grid that reaches ``margin`` and a cell beyond ``surface``, and its nodes along each axis."""
+    """The first node (3,) [mm] of a grid that reaches ``margin`` and a cell beyond ``surface``, and the numbers of nodes."""
     low, high = surface.points.min(axis=0) - margin - spacing, surface.points.max(axis=0) + margin + spacing
     return low, tuple(int(count) for count in np.ceil((high - low) / spacing) + 1)
 
 
 def signed_distances(points: Floats, surface: Surface) -> Floats:
-    """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative where it winds round them."""
+    """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative inside, by winding number."""
     found = [
         np.where(inside(surface, chunk), -1.0, 1.0) * distances(chunk, surface).distance
         for chunk in np.array_split(np.ascontiguousarray(points), 1 + len(points) // _CHUNK)
@@ -212,20 +212,20 @@ def signed_distances(points: Floats, surface: Surface) -> Floats:
 
 
 def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: float, margin: float) -> Floats:
-    """The distance at nodes: exact within the margin and some cells more, trilinear between every fourth elsewhere."""
+    """The distance at nodes: exact within the margin and some cells more, elsewhere trilinear between every fourth node."""
     coarse_shape = [-(-(count - 1) // _STRIDE) + 1 for count in shape]
     coarse_points = low + np.moveaxis(np.indices(coarse_shape), 0, -1).reshape(-1, 3) * (_STRIDE * spacing)
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
     stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
     values: Floats = scipy.ndimage.zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
-    # The error of trilinear values is at most half the diagonal of a coarse cell: the gradient of a distance has length 1.
+    # The error of trilinear values is at most half the diagonal of a coarse cell, as the gradient of a distance has length 1.
     near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
     values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
     return values
 
 
 def _coefficients(values: Floats) -> Floats:
-    """Coefficients of the B-splines through ``values`` (i, j, k) and one more on each side, by odd reflection at the border."""
+    """Coefficients of the B-splines through ``values`` (i, j, k), and one more on each side, by odd reflection at the border."""
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
     return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])
@@ -240,7 +240,7 @@ def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
 
 
 def _on(surface: Surface) -> Floats:
-    """All vertices, all middles of edges and triangles, and random points of edges, more on longer ones: (n, 3) [mm]."""
+    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer ones: (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -251,7 +251,7 @@ def _on(surface: Surface) -> Floats:
 
 
 def _around(surface: Surface, reach: float) -> Floats:
-    """Random points (n, 3) of the triangles, moved by up to ``reach`` [mm] in any direction; the same every time."""
+    """Random points (n, 3) on the triangles, moved by up to ``reach`` [mm] in any direction; the same every time."""
     random = np.random.default_rng(1)
     areas = triangle_areas(surface.points, surface.triangles)
     corners = surface.points[surface.triangles[random.choice(len(areas), _PROBES, p=areas / areas.sum())]]

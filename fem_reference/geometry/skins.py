@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corner_areas, diagonal
 from fem_reference.geometry.embedding import Locator
 
-# A triangle is thin if the square of its longest edge is more than this many times its area: for half a square the ratio is 4.
+# A triangle is thin if the square of its longest edge is more than this many times its area; half a square has the ratio 4.
 _THIN = 5.0
 # A triangle cut in four: the barycentric coordinates (3, 3) of the corners of each part.
 _QUARTERS = np.array(
@@ -20,14 +20,14 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The least number of points along the diagonal of a surface: on muscles of the hip, 3 mm apart.
+# The least number of points along the diagonal of a surface: on muscles of the hip they are 3 mm apart.
 _ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points of a surface that the cells follow only roughly: the straight ``cells`` (n,) that carry them, their rest
-    positions ``points`` (n, 3) [mm], perhaps somewhat outside their cell, and their rest ``areas`` (n,) [mm2].
+    """Material points of a surface that the mesh follows only roughly: the straight ``cells`` (n,) that carry them, their rest
+    positions ``points`` (n, 3) [mm], possibly slightly outside their cell, and their rest ``areas`` (n,) [mm2].
     """
 
     cells: Ints
@@ -36,7 +36,7 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """The greatest average distance [mm] of points on a ``surface``, independent of its mesh."""
+    """The average distance [mm] of points on a ``surface`` that is allowed at most, independent of its mesh."""
     return diagonal(surface.points) / _ACROSS
 
 
@@ -51,8 +51,8 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Three points (3 k, 3) [mm] inside each triangle of ``corners`` (k, 3, 3), a rule that is exact for squares and has no points
-    on sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
+    """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3), a rule exact for quadratic functions without points on
+    sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas
@@ -72,7 +72,7 @@ class Pieces:
 
     @classmethod
     def whole(cls, triangles: Ints) -> "Pieces":
-        """Uncut, those with the numbers ``triangles`` (k,)."""
+        """The uncut triangles with the indices ``triangles`` (k,)."""
         return cls(triangles, np.broadcast_to(np.eye(3), (len(triangles), 3, 3)))
 
     def __getitem__(self, some: NDArray[np.bool_]) -> "Pieces":
@@ -87,11 +87,11 @@ class Pieces:
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":
-        """Each cut in four at the middles of its edges."""
+        """The pieces, each cut in four at the midpoints of its edges."""
         return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
-        """Each cut in two at the middle of its longest edge of ``lengths`` (k, 3), the first of which leaves corner 0."""
+        """The pieces, each cut in two at the middle of its longest edge; ``lengths`` (k, 3): of the edges that leave corners."""
         order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
         halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]

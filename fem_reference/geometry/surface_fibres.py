@@ -10,14 +10,14 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
-_THIN = 1e-6  # the squared thickness of a section over its squared width below which its lines are on one surface
-_GOLDEN = np.pi * (3 - np.sqrt(5))  # from seed to seed of a sunflower [rad]
+_THIN = 1e-6  # the squared thickness of a section over its squared width below which its lines count as lying on one surface
+_GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle, from seed to seed of a sunflower [rad]
 
 
 def between(heads: Sequence[Polylines], count: int) -> Polylines:
-    """``count`` lines of 40 points between the surface fibres of each of the ``heads``, shared among them by their mean sections.
+    """``count`` lines of 40 points between the surface fibres of each of ``heads``, shared in proportion to their mean sections.
 
-    The surface fibres of a head, three or more in any order, have to run around it. Each point of a line is on a spline through two
+    The surface fibres of a head, three or more in any order, must surround it. Each point of a line is on a spline through two
     opposite points of a closed spline around the head and the mean of its fibres.
     """
     grids = [_around(_alike(lines, i)) for i, lines in enumerate(heads)]
@@ -44,7 +44,7 @@ def _around(lines: Floats) -> Floats:
 
 
 def _halfway(lines: Floats) -> Floats:
-    """The places (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, across their mean and from it; the farthest is on the first axis."""
+    """The positions (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, across their mean and from it; the farthest on the first axis."""
     mean = lines.mean(axis=0)
     normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
     normal /= np.linalg.norm(normal)
@@ -56,8 +56,8 @@ def _halfway(lines: Floats) -> Floats:
 
 
 def outermost(lines: Polylines, count: int) -> Polylines:
-    """At most ``count`` of ``lines``, by 40 points each: in each of as many sectors halfway the farthest out. Sectors are equal
-    where the section of the lines is stretched to be as wide in all directions, so that a flat muscle has lines on all sides.
+    """At most ``count`` of ``lines``, with 40 points each: the outermost halfway in each of ``count`` sectors. Sectors are equal
+    after a stretch that makes the section of the lines as wide in all directions, so that a flat muscle has lines on all sides.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)
@@ -98,7 +98,7 @@ def _inside(grid: Floats, count: int) -> list[Floats]:
 
 
 def _loop(points: Floats, turns: Floats) -> Floats:
-    """Points (n, 3) after ``turns`` (n,) of a closed spline through ``points`` (m, 3); straight where two of them meet."""
+    """Points (n, 3) after ``turns`` (n,) of a closed spline through ``points`` (m, 3); straight where two of these coincide."""
     closed = np.concatenate([points[-2:], points, points[:3]])
     at = turns * len(points) + 2
     if np.linalg.norm(np.diff(closed, axis=0), axis=1).min() == 0:
@@ -108,7 +108,7 @@ def _loop(points: Floats, turns: Floats) -> Floats:
 
 
 def _across(points: Floats, radius: float) -> Floats:
-    """The point (3,) at a ``radius``, 1 at the first and 0 at the second, of a spline through three ``points`` (3, 3)."""
+    """The point (3,) of a spline through three ``points`` (3, 3) at a ``radius``, 1 at the first and 0 at the second."""
     if np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
         return np.asarray(points[1] + radius * (points[0] - points[1]))
     middle = knots(points, 0.5)[1]

@@ -11,9 +11,9 @@ from fem_reference.geometry.obstacles import Ring, SmoothSurface
 
 Flags = NDArray[np.bool_]
 
-# Pieces of a string, sweeps over it, and their factor of overrelaxation: 1 takes a point to the middle of its neighbours.
+# Numbers of pieces of a string and of sweeps over it, and their overrelaxation: 1 moves a point to the middle of its neighbours.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
-# The most points of a string; a very thin tube would need more, so that no piece of the string slips past it.
+# The largest number of points of a string; a very thin tube would need more, lest a piece of the string slip past it.
 MOST = 10_000
 
 
@@ -21,10 +21,10 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
     """Points (n, N, 3) of strings that are nearly taut: each in the middle of its neighbours, or on an obstacle."""
     rings = [one for one in obstacles if isinstance(one, Ring)]
     string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
-    # Points are moved aside a little: a point in the middle of an obstacle has no direction out of it.
+    # Points are moved aside slightly, as a point in the middle of an obstacle has no direction out of it.
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
-    for ring in rings:  # no piece may slip past a tube
+    for ring in rings:  # no piece may slip past the tube
         while string.shape[1] <= MOST and np.linalg.norm(np.diff(string, axis=1), axis=2).max() > ring.tube / 2:
             string = halved(string)
     for first in (1, 2) * _SWEEPS:
@@ -52,7 +52,7 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of the points of strings that may touch an obstacle: nearer to it than a tangent after a quarter of a piece."""
+    """Mask (n, N) of the points of strings that may touch an obstacle: closer to it than a tangent after a quarter of a piece."""
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
     piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2
@@ -69,7 +69,7 @@ def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, .
 
 
 def longest(flags: Flags) -> tuple[Ints, Ints]:
-    """The first and the last of the longest run of True in each row (n, N)."""
+    """The first and the last index of the longest run of True in each row (n, N)."""
     run = np.zeros(flags.shape, dtype=np.int64)
     for i, column in enumerate(flags.T):
         run[:, i] = np.where(column, run[:, i - 1] + 1, 0)

@@ -1,6 +1,6 @@
-"""Closed triangle surfaces of bones of closed form, for pictures and for code that needs a bone's surface.
+"""Closed triangulated surfaces of bones of closed form, for pictures and for code that needs the surface of a bone.
 
-Their vertices lie on the body. A ball, a capsule and a box are built alike: from the corner parts of a sphere, moved apart.
+Their vertices lie on the body. A ball, a capsule and a box are built in one way: from the octants of a sphere, moved apart.
 """
 
 import numpy as np
@@ -9,17 +9,17 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.block import lattice_skin
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, Vector
 
-# Sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
+# Number of sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
 TURN = 64
-# For a half-space, half the side of its square and the thickness of its slab, each over the size of the nearby points.
+# For a half-space: half the side of its square and the thickness of its slab, relative to the extent of the points ``beside`` it.
 _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of closed form, with ``turn`` sides to a full turn; its errors name ``place``.
+    """The closed outward surface of a body of closed form, with ``turn`` sides per full turn; errors name ``place``.
 
-    A half-space extends past the points ``beside`` (n, 3) [mm]: as it is infinite, it becomes a slab, of whose vertices only
-    those in the plane lie on the body.
+    A half-space extends past the points ``beside`` (n, 3) [mm]: as it is infinite, it is represented by a slab, of which
+    only the vertices in the plane lie on the body.
     """
     match solid:
         case HalfSpace():
@@ -43,7 +43,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
 
 
 def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
-    """A slab behind a square in the plane, under the middle of the points ``beside``."""
+    """A slab behind a square in the plane, centred below the points ``beside``."""
     middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
     size = diagonal(beside)
     frame = _frame(np.asarray(half_space.normal, float))
@@ -63,8 +63,8 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
-    """Along an axis, the corners about -``half`` and ``half``, each in ``count`` steps of equal angles from the middle of a face
-    to the edge of a cube: the tangents of the angles, and the centre of each. Two corners about one centre share a middle.
+    """The rounded corners at -``half`` and ``half`` along an axis, each in ``count`` steps of equal angles from the middle of a
+    face to the edge of a cube: the tangents of the angles, and the centre of each. Two corners about one centre share their middle.
     """
     if rounding == 0:
         return np.array([-1.0, 1.0]), np.array([-half, half])
@@ -76,7 +76,7 @@ def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
 
 
 def _prism(cylinder: Cylinder, turn: int) -> tuple[Floats, Ints]:
-    """Both ends of the cylinder as fans about their centres, and its side."""
+    """Both ends of the cylinder, as fans about their centres, and its lateral surface."""
     angles = 2 * np.pi * np.arange(turn) / turn
     length = float(np.linalg.norm(np.subtract(cylinder.end, cylinder.start)))
     ring = cylinder.radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(turn)])

@@ -1,4 +1,4 @@
-"""Filling of a closed surface with tetrahedra of high quality: the mesh does not keep the vertices of a finer surface.
+"""Filling of a closed surface with tetrahedra of high quality; the vertices of a finer surface are not kept.
 
 ``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher, which may crash, hang or keep global state.
 """
@@ -34,21 +34,21 @@ from fem_reference.geometry.rims import with_rims
 log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
-_ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
-_VOLUME_WITHIN = 0.05  # no closer, as the volume of a surface that passes through itself is not well defined
-_MOST_TETS = 3e6  # some GB and minutes, far more than a solver can use
+_ROUNDED = 6  # decimals [mm] in the mesher's frame: far below any size, far above the round-off from moving a surface
+_VOLUME_WITHIN = 0.05  # relative; not less, as the volume of a surface that intersects itself is not well defined
+_MOST_TETS = 3e6  # takes some GB and minutes, far more than a solver can use
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
-    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. By gmsh they have ``facets``
-    by attachment, whose ``shares`` (m, 3) are the attached shares of the corners of triangles; ``maker`` names the mesher.
-    InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
+    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Those of gmsh have ``facets``
+    for each attachment; its ``shares`` (m, 3) are the attached shares of the corners of triangles. ``maker`` names the mesher.
+    InputError if no mesher succeeds, and at once where ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that does
-    not pass through itself and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so it moves with
-    the surface. Where gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
+    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface without
+    self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
+    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -61,9 +61,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 
 
 def check_size(surface: Surface, size: float) -> None:
-    """Raise InputError where more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` is above its smallest extent.
+    """Raise InputError if more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` exceeds its smallest extent.
 
-    The extent is that in the frame of its vertices, so that turning the surface changes nothing.
+    The extent is measured in the frame of its vertices, so that rotating the surface changes nothing.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
@@ -75,7 +75,7 @@ def check_size(surface: Surface, size: float) -> None:
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
-    """Origin (3,) and axes in columns (3, 3): from point 0 to the farthest, then to the farthest from that line."""
+    """Origin (3,) and axes in columns (3, 3): from point 0 to the farthest point, then to the point farthest from that line."""
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]
     first = first / np.linalg.norm(first)
@@ -115,10 +115,10 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with as many triangles as equilateral ones of side ``size`` cover it, or unchanged where it has fewer, with
-    edges along the rims of attachments; and the labels of its triangles, 0 where free.
+    """The surface with as many triangles as equilateral ones of side ``size`` would cover it, unchanged if it has fewer, with edges
+    along the rims of attachments; and the labels of its triangles, 0 if free.
 
-    Where the coarse surface passes through itself, one of a few other counts may give one that does not, or one without rims.
+    If the coarse surface intersects itself, a few other counts are tried, and then a surface without rims.
     """
     count = triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4)
     fine = count >= len(surface.triangles)
@@ -137,7 +137,7 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
 
 
 def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
-    """The coarse surface; InputError where it omits a part of the ``surface``."""
+    """The ``coarse`` surface; InputError if it lacks a part of the ``surface``."""
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
@@ -147,7 +147,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 
 def run(mesher: str, surface: Surface, size: float) -> TetMesh:
-    """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError where it crashes or takes too long."""
+    """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError if it crashes or takes too long."""
     with subprocesses.scratch_folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
@@ -183,8 +183,8 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError where nothing is left, a tet is flat, or the tets do not fill about the volume in ``surface``. Their boundary
-    is closed, for no triangle belongs to more than two of them.
+    InputError if nothing is left, a tet is flat, or the volume of the tets is not about that of ``surface``. Their boundary is
+    closed, as no triangle belongs to more than two of them.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")
@@ -211,7 +211,7 @@ def _largest_part(tets: Ints, place: str) -> Ints:
 
 
 def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
-    """Points and tets that fill a closed surface, its triangles kept, its points first and in their order."""
+    """Points and tets that fill a closed surface: its triangles are kept, its points come first, in their order."""
     import gmsh
 
     gmsh.initialize()
@@ -236,7 +236,7 @@ def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
 
 
 def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
-    """Points and tets within a twentieth of ``size`` of a surface that may pass through itself."""
+    """Points and tets within a twentieth of ``size`` of a surface that may intersect itself."""
     import pytetwild
 
     near = size / 20 / diagonal(points)

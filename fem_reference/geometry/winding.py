@@ -1,8 +1,8 @@
-"""The shortest paths around several smooth obstacles: straight pieces and geodesics, alternately, without a kink between them.
+"""The shortest paths around several smooth obstacles: straight pieces and geodesics in turn, joined without kinks.
 
-A taut string finds the obstacles that a path meets, and nearly where; Newton's method then finds the point, direction and length
+A taut string finds the obstacles that a path meets, and roughly where; Newton's method then finds the point, direction and length
 of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219,
-DOI 10.1007/s11044-015-9451-1). A path is the shortest near the straight one, and meets an obstacle at most once.
+DOI 10.1007/s11044-015-9451-1). A path is a local minimum of length near the straight path, and meets each obstacle at most once.
 """
 
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.obstacles import Quadric, SmoothSurface, Touch
 from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, met, taut, touching
 
-# Steps of a geodesic; the error of its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
+# Steps of a geodesic; the error at its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
 _STEPS = 60
-# Newton's iterations, their end [of the distance between the ends] and the step of their finite differences.
+# Newton's iterations, their tolerance [share of the distance between the ends] and the step of their finite differences.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
-# Points of a path at which it is checked for crossing an obstacle, besides the deepest points of its chords.
+# Number of points at which a path is checked for crossing an obstacle, besides the deepest points of its chords.
 _CHECKED = 200
 
 
@@ -26,8 +26,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
 
-    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; where there are fewer than m, all other
-    knots are at the end. ``failed`` (n,): Newton's method found no path.
+    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m, all other
+    knots are at the end. ``failed`` (n,) is True where Newton's method found no path.
     """
 
     knots: Floats
@@ -38,7 +38,7 @@ class Winding:
 
     @classmethod
     def straight(cls, count: int, starts: Floats, ends: Floats) -> "Winding":
-        """The straight paths, with knots for ``count`` obstacles."""
+        """Straight paths, with room for the knots of ``count`` obstacles."""
         away = np.linalg.norm(ends - starts, axis=1)
         along = (ends - starts) / np.where(away > 0, away, 1.0)[:, None]
         size = 2 + count * (_STEPS + 1)
@@ -47,7 +47,7 @@ class Winding:
         return cls(knots, tangents, arcs, np.zeros((len(starts), count), np.int64), np.zeros(len(starts), bool))
 
     def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
-        """The paths ``which`` along geodesics ``same`` on the obstacles of a ``pattern``."""
+        """Store the rows ``same`` of geodesics on the obstacles of a ``pattern`` as the paths ``which``."""
         size = _STEPS + 1
         steps = np.zeros((len(which), self.knots.shape[1] - 1))
         for i, (points, tangents) in enumerate(pieces.run()):
@@ -55,7 +55,7 @@ class Winding:
             self.knots[which, on] = points[:, same].swapaxes(0, 1)
             self.tangents[which, on] = tangents[:, same].swapaxes(0, 1)
             steps[:, on.start : on.stop - 1] = pieces.sizes[i, same, None] / _STEPS
-        for i in range(len(pattern) + 1):  # the straight pieces
+        for i in range(len(pattern) + 1):  # straight pieces
             gap = self.knots[which, i * size + 1] - self.knots[which, i * size]
             steps[:, i * size] = np.linalg.norm(gap, axis=1)
         self.tangents[which, 0] = self.tangents[which, 1]
@@ -82,7 +82,7 @@ class Winding:
         return found
 
     def at(self, which: Ints, shares: Floats) -> Floats:
-        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths: cubics between knots."""
+        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, by cubics between knots."""
         wanted = shares * self.lengths[which]
         low = np.clip((self.arcs[which] <= wanted[:, None]).sum(axis=1) - 1, 0, self.arcs.shape[1] - 2)
         span = self.arcs[which, low + 1] - self.arcs[which, low]
@@ -112,7 +112,7 @@ class _Pieces:
         return [_geodesic(*part) for part in parts]
 
     def kinks(self) -> Floats:
-        """Distances (n, 4 m) [mm] of straight parts from the tangents at both ends of each geodesic, along normal and binormal."""
+        """Distances (n, 4 m) [mm] of straight pieces from the tangents at both ends of each geodesic, along normal and binormal."""
         runs, found = self.run(), []
         before = [self.starts, *(points[-1] for points, _ in runs)]
         after = [*(points[0] for points, _ in runs[1:]), self.ends]
@@ -129,12 +129,12 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts[which], self.ends[which], *parts)
 
     def pressed(self) -> Flags:
-        """True (m, n) where tension presses a path onto an obstacle: the surface is convex along the middle of the geodesic."""
+        """Mask (m, n): tension presses the path onto the obstacle, as the surface is convex along the middle of the geodesic."""
         middles = [(points[_STEPS // 2], tangents[_STEPS // 2]) for points, tangents in self.run()]
         return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
 
     def moved(self, change: Floats) -> "_Pieces":
-        """The geodesics after changes (n, 4 m): along, across [mm], direction [rad], length [mm] of each."""
+        """The geodesics after changes (n, 4 m) of each: start along and across [mm], direction [rad], length [mm]."""
         points, along, sizes = [], [], []
         for i, obstacle in enumerate(self.obstacles):
             ahead, aside, turn, longer = (change[:, 4 * i + k] for k in range(4))
@@ -152,7 +152,7 @@ class _Pieces:
 
 @np.errstate(all="ignore")  # NaN counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, outside which both are."""
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``; both ends are outside these."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
     found = Winding.straight(len(obstacles), starts, ends)
@@ -162,7 +162,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
         if not pattern:
             continue
         pieces, smooth = _solved(_guess([(j, obstacles[j]) for j in pattern], string[which]))
-        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): not met after all
+        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): the obstacle is not met after all
         for left_out in {tuple(column) for column in short.T.tolist()}:
             same = np.flatnonzero(np.all(np.array(left_out) == short.T, axis=1))
             if any(left_out):
@@ -190,7 +190,7 @@ def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -
 
 
 def _deepest(obstacle: Quadric, found: Winding) -> Floats:
-    """The shares (n,) of the paths' lengths at which their chords are deepest in an obstacle, however small it is."""
+    """The shares (n,) of the paths' lengths at which their chords are deepest in an obstacle, even a small one."""
     begins, ends = found.knots[:, :-1], found.knots[:, 1:]
     at = obstacle.deepest(begins, ends)
     values = obstacle.level((begins + at[:, :, None] * (ends - begins)).reshape(-1, 3))[0].reshape(at.shape)
@@ -216,7 +216,7 @@ def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
 
 
 def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
-    """The geodesics without kinks, by Newton's method, and True (n,) where there are none left."""
+    """The geodesics for which Newton's method removes the kinks, and a mask (n,), True where it succeeds."""
     near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
@@ -228,7 +228,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
         count, size = kinks.shape
         every = part.rows(np.tile(np.arange(count), size)).moved(_STEP * np.repeat(np.eye(size), count, axis=0))
         slopes = (every.kinks().reshape(size, count, size) - kinks).transpose(1, 2, 0) / _STEP
-        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # these paths stay as they are, and fail
+        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # these paths remain unchanged, and fail
         change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
         change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
         part, kinks = _better(part, change, np.linalg.norm(kinks, axis=1))
@@ -237,7 +237,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
 
 
 def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, Floats]:
-    """The geodesics after a ``change`` (n, 4 m), halved where kinks, ``before`` (n,) [mm], would not fall; and their kinks."""
+    """The geodesics after a ``change`` (n, 4 m), halved while the kinks, ``before`` (n,) [mm], would grow; and their kinks."""
     for _ in range(5):
         tried = pieces.moved(change)
         kinks = tried.kinks()

@@ -1,7 +1,7 @@
 """The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, geodesic, straight.
 
-Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of its
-rotation, both are an arc of a circle between two tangents, so one closed form serves both (the "obstacles" of
+Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of
+rotation, each is an arc of a circle between two tangents, so that one closed form serves both (the "obstacles" of
 Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
 """
 
@@ -16,7 +16,7 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface; a straight path is wholly before it.
+    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and after the surface; a straight path is wholly before it.
 
     ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along it a path turns
     by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
@@ -32,11 +32,11 @@ class Paths:
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """False (n,): each closed form has a path."""
+        """All False (n,): the closed form always gives a path."""
         return np.zeros(len(self.parts), dtype=bool)
 
     def touching(self) -> list[Touch]:
-        """The one obstacle, as if met at the starts and left at the ends: the resultant on it is the same."""
+        """The one obstacle, as if paths met it at their starts and left it at their ends: the resultant force on it is the same."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 
@@ -46,7 +46,7 @@ class Paths:
         return np.asarray(self.parts.sum(axis=1))
 
     def directions(self) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) along the paths where they leave their starts and where they reach their ends; 0 without a length."""
+        """Unit vectors (n, 3) along the paths at their starts and at their ends; 0 for a path of length 0."""
         straight, wraps = self.ends - self.starts, self.parts[:, 1] > 0
         climb = _along(self.touches[1] - self.touches[0], self.axes)
         arms = (_across(touch - self.middles, self.axes) for touch in self.touches)
@@ -65,7 +65,7 @@ class Paths:
         return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_surface(which, on), straight))
 
     def _on_surface(self, which: Ints, share: Floats) -> Floats:
-        """The points (m, 3) after ``share`` (m,) of the path along the surface."""
+        """The points (m, 3) after ``share`` (m,) of the part of the path on the surface."""
         first, last, axes, middles = (values[which] for values in (*self.touches, self.axes, self.middles))
         height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
         turned = _turned(first - middles - height, axes, share * self.turns[which])
@@ -73,8 +73,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both or
-    one of them where they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both, any
+    one if they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -146,7 +146,7 @@ def _across(vectors: Floats, axes: Floats) -> Floats:
 
 
 def _perpendicular(normals: Floats, arms: Floats) -> Floats:
-    """``normals`` (n, 3) of length 1; where one is round-off, any direction perpendicular to its arm."""
+    """``normals`` (n, 3) scaled to length 1; for one that is only round-off, some direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])
