@@ -41,7 +41,7 @@ class FitError:
 
     @property
     def fewer(self) -> float:
-        """The numbers of the vertices over those of the Gaussians."""
+        """How many times fewer numbers define the Gaussians than the vertices."""
         return 3 * self.vertices / (4 * self.gaussians)
 
 

@@ -39,7 +39,7 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point farther outside the tets than this share of the mesh's diagonal counts as outside; a nearer one is rounding.
+# A point counts as outside the tets if its distance from them exceeds this share of the mesh's diagonal; less may be rounding.
 ROUNDING = 1e-9
 
 

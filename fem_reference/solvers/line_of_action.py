@@ -78,7 +78,7 @@ class Shortest:
         if wrong:
             self.wrong = Trouble("diverged", wrong)
         else:
-            points = paths.at(passed.part, passed.share)  # as many as the fibres have
+            points = paths.at(passed.part, passed.share)  # as many points as the fibres have
             lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
             scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
             self.found = Frame(number, None, fibres=points, scalars=scalars)

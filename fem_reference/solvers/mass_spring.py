@@ -27,7 +27,7 @@ from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
-# The default time step over the greatest stable one.
+# The ratio of the default time step to the greatest stable one.
 SHARE_OF_STABLE = 0.9
 # A run with more steps per frame number than this is refused: with 3,000 tetrahedra a frame number would take over two seconds.
 _MOST_STEPS = 100_000
