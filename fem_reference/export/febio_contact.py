@@ -99,7 +99,7 @@ def notes(problem: MuscleProblem) -> list[str]:
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
-    """The distance of FEBio's springs from those of the reference, and their stiffness, in all and against turning."""
+    """The distance of FEBio's springs from those of the reference, and their stiffness in total and against rotation."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
     assert attached.stiffness is not None  # one by springs

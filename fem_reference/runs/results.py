@@ -127,7 +127,7 @@ class Results:
         there = self.names(state)
         for name in names or ():
             if name not in there:
-                raise InputError("names", f'"{name}"', f"one of the results of this run: {', '.join(there)}")
+                raise InputError("names", f'"{name}"', f"one of {', '.join(there)}, which this run has")
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:
