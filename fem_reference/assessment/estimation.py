@@ -41,7 +41,7 @@ class FitError:
 
     @property
     def fewer(self) -> float:
-        """How many times fewer numbers define the Gaussians than the vertices."""
+        """The ratio of the numbers that define the vertices to those that define the Gaussians."""
         return 3 * self.vertices / (4 * self.gaussians)
 
 
