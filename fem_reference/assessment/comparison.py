@@ -51,7 +51,7 @@ class Comparison:
     """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
     reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has
     none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the extension on
-    the reference's own surface, None where there is none. ``error_bars``: those of the reference, None without;
+    the reference's own surface, None where there is none. ``error_bars``: those of the reference, None if not computed;
     ``ladders``: its convergence, where measured.
     """
 

@@ -124,7 +124,7 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of changes and deviations, of every statistic of every metric but those of a run itself, which are exact."""
+    """The bars of changes and deviations, for every statistic of every metric except those of a run itself, which are exact."""
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(as_surface)
 

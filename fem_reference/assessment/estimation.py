@@ -41,7 +41,7 @@ class FitError:
 
     @property
     def fewer(self) -> float:
-        """The numbers of the vertices over those of the Gaussians."""
+        """The ratio of the numbers that define the vertices to those that define the Gaussians."""
         return 3 * self.vertices / (4 * self.gaussians)
 
 

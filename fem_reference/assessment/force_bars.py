@@ -32,7 +32,7 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
             bar = together(parts, np.ones(len(moved), bool))
             model = (
                 SPREAD * _length(kind, bone, pair.fine) if pair.springs else None
-            )  # of springs spread in another way
+            )  # the change by springs that are spread in another way
             if model is not None and pair.exact is not None:
                 model = np.fmax(model, _length(kind, bone, pair.exact, pair.coarse))
             bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, model))

@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None where unknown."""
+    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None where unknown."""
 
     scene: MuscleCase
     candidate: Run

@@ -31,7 +31,7 @@ class ArmRange:
 
 
 def poses(angles: Floats) -> Floats:
-    """Angles (a,) [deg] in steps of 2 degrees over those of frames (f,) [deg], from the next even one on."""
+    """Angles (a,) [deg] in steps of 2 degrees over the range of the ``angles`` of frames (f,) [deg], at even numbers of degrees."""
     first, last = np.ceil(angles.min() / STEP - 1e-9), np.floor(angles.max() / STEP + 1e-9)
     return np.asarray(STEP * np.arange(first, last + 1) + 0.0)  # no -0
 

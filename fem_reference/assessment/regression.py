@@ -111,7 +111,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
     found = [_moved(baseline.positions, current)]
     for name, stored in baseline.measures.items():
         found += _of_statistic(name, stored, current)
-    # A worse result comes before a merely different one.
+    # Judgements of worse results come before judgements of results that merely differ.
     found.sort(
         key=lambda one: (WORST_FIRST.index(one.word), one.question != "within", one.name != MOVED, -one.used, one.name)
     )
@@ -139,7 +139,7 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
 
 
 def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) -> Iterator[Judgement]:
-    """Judge whether a statistic is unchanged (the baseline is exact but for rounding), and whether it is within its allowed
+    """Judge whether a statistic is unchanged (the baseline is exact up to rounding), and whether it is within its allowed
     distance from the reference, which is known up to its error bar.
     """
     was, now, within = stored.numbers, current.values(name), math.nan if stored.within is None else stored.within

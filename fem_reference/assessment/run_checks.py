@@ -84,7 +84,7 @@ def of_body(body: Body, solved: Run) -> RunChecks:
 
 
 def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
-    begun = body.start is not None  # its first state is prescribed
+    begun = body.start is not None  # then the first state is prescribed
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
             if entry.stiffness is None and isinstance(entry.on, str):
@@ -119,7 +119,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
     found = (_complete(problem.frames, run.numbers), _finite(run.numbers, arrays))
     if not all(one.met for one in found):
         return found
-    if problem.start is not None:  # its first state is prescribed
+    if problem.start is not None:  # then the first state is prescribed
         scalars = {name: values[1:] for name, values in run.scalars.items()}
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)

@@ -13,16 +13,16 @@ _LEAST, _MOST = 0.5, 2.0
 _FARTHEST = 1.0
 # The share of the surface that may be inside out, beyond that of the reference.
 _TURNED = 0.05
-# A vertex is stuck if it moves by less than the first, and the reference by more than the second, in sizes of the body.
+# A vertex is stuck if it moves by less than the first share of the body's size, and in the reference by more than the second.
 _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are no answer, with its frame; empty where they are one, and for a run without
-    this surface. Only frames that both runs reached count.
+    """The first reason why the frames of a ``run`` are no answer, with its frame; empty where they are an answer, and for a run
+    without the reference's surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
-        return ""  # lines, or another surface
+        return ""  # a run of lines, or of another surface
     if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
         return "unknown: no frame without values that are not numbers"
     both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
@@ -33,7 +33,7 @@ def unsound(run: Run, reference: Run) -> str:
 
 
 def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
-    """The reason at a frame, from positions (n, 3) [mm]; empty without one."""
+    """The reason at a frame, from positions (n, 3) [mm]; empty where there is none."""
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:
@@ -50,7 +50,7 @@ def _inside_out(run: Run, points: Floats) -> float:
 
 
 def _stuck(mine: Floats, truth: Floats) -> str:
-    """The reason if vertices rest in all frames although the reference moves them, as for elements that a solver dropped."""
+    """The reason if vertices do not move in any frame although the reference moves them, as when a solver drops elements."""
     size = diagonal(truth[0])
     moved, wanted = (np.linalg.norm(one - one[0], axis=2).max(axis=0) / size for one in (mine, truth))
     stuck = (moved < _STILL) & (wanted > _MOVES)

@@ -13,17 +13,17 @@ from fem_reference.io import texts
 # The version of the method of measurement: rows of another version are stale.
 PROTOCOL = 3
 STATES = ("failed", "stale")
-# The statistic by which rows are compared [mm], and the same in per cent; the matched error [mm] and time of a frame number [s].
+# The statistic by which rows are compared [mm], and the same in per cent; the error [mm] and time [s] at which they are matched.
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
 MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 
 
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
-    empty for the reference, which has ``bars``. ``from_rest``: root mean square [mm] from the first to the last frame where the
-    reference is back at rest. ``unsound``: the reason why its frames are no answer. ``split``: root mean squares [mm] of the parts
-    of its error. ``least_error`` [mm] if it is within the matched time, ``least_time`` [s] if within the matched error. ``truth``
-    and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``: that of the measurement; ``stale``: True where
+    empty for the reference, which has ``bars``. ``from_rest``: rms distance [mm] of the last frame from the first, if the reference
+    is back at rest there. ``unsound``: the reason why its frames are no answer. ``split``: root mean squares [mm] of the parts
+    of its error. ``least_error``: the error [mm] if within the matched time; ``least_time``: the time [s] if within the matched
+    error. ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``; ``stale``: True where
     case, reference, solver, protocol or time limit changed since; ``time_limit``: its greatest processor time [s].
     """
 

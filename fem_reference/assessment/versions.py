@@ -51,7 +51,7 @@ class Change:
 
     @property
     def by(self) -> float:
-        """The change in that frame, positive where it is farther away; NaN without a number before and now."""
+        """The change in that frame, positive where the distance grew; NaN without a number before or now."""
         return float(self.further[self.at])
 
     @property

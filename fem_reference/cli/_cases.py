@@ -87,7 +87,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
 
 
 def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = ()) -> tuple[Candidate, ...]:
-    """The solver of ``--solver-command`` as a candidate, with a name unlike those of ``others``; none without the option."""
+    """The solver of ``--solver-command`` as a candidate, whose name must differ from all ``others``; none without the option."""
     if options.solver_command is None:
         return ()
     own = command.choice(options.solver_command, Path.cwd(), "--solver-command")

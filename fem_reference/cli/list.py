@@ -58,7 +58,7 @@ def _settings(name: str) -> dict[str, Any]:
     for offer in solvers.offers(name):
         fields = offer.settings.model_fields
         found |= {key: REQUIRED for key, field in fields.items() if field.is_required()}
-        stated = {*offer.settings.model_fields}  # without hashes of files, which may not exist
+        stated = {*offer.settings.model_fields}  # not the computed hashes of files, as files may not exist
         found |= offer.settings.model_construct().model_dump(mode="json", include=stated, warnings=False)
     return found
 

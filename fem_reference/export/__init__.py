@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 _FEBIO_FILES = """\
-| `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
+| `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` states what is the same and what differs |
 | `tet10.csv` | the ten nodes of each element of `scene.feb`, in FEBio's order |
 """
 _FEBIO_OF_ALL = """

@@ -84,7 +84,7 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
     """Depth [mm] inside a bone to which FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that
     would press at once with more than the matrix bears.
     """
-    assert problem.contact is not None  # or there is no contact
+    assert problem.contact is not None  # called only with contact
     softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
     bears = _AT_ONCE * 2 * softest / problem.contact.stiffness
     return min(SEARCH_RADIUS, bears) if deep > bears else SEARCH_RADIUS
@@ -99,7 +99,7 @@ def notes(problem: MuscleProblem) -> list[str]:
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
-    """The distance of FEBio's springs from those of the reference, and their stiffness, in all and against turning."""
+    """The distance of FEBio's springs from those of the reference, and their stiffness in total and against rotation."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
     assert attached.stiffness is not None  # one by springs

@@ -19,7 +19,7 @@ from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import Floats, Ints, tet_volumes
 from fem_reference.problems.muscle import MuscleProblem
 
-MUSCLE = "muscle"  # the name of the elements and the material of a muscle without regions, and the beginning of those of its parts
+MUSCLE = "muscle"  # the name of a muscle's elements and material; with regions, the names of its parts begin with it
 # The parameters to which an energy is proportional.
 SCALED: dict[type[Effect], tuple[str, ...]] = {
     NeoHooke: ("mu",),

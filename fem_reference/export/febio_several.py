@@ -14,7 +14,7 @@ _NUMBERED = {"node": "node", "elem": "elem", "material": "material", "load_contr
 _OF_NODES = ("elem", "tri3", "tri6", "NodeSet")
 _ONCE = ("Module", "Control")  # sections that are the same for all
 _ORDER = (*_ONCE, "Material", "Mesh", "MeshDomains", "MeshData", "Boundary", "Rigid", "Contact", "LoadData", "Output")
-_FIRST = ("Nodes", "Elements")  # of a mesh
+_FIRST = ("Nodes", "Elements")  # the entries that come first in a mesh
 
 
 def model(problem: MusclesProblem) -> Element:

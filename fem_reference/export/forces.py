@@ -36,7 +36,7 @@ def write_table(comparison: Comparison, path: Path) -> None:
 
 def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object, ...]]:
     setup, numbers, context = comparison.setup, comparison.reference.numbers, comparison.context
-    assert isinstance(context, MeasurementContext)  # of a muscle
+    assert isinstance(context, MeasurementContext)  # the case is of a muscle
     i = next((i for i, joint in enumerate(setup.joints) if joint.bone.name == bone.name), None)
     joint, lost = None if i is None else setup.joints[i], np.full((len(numbers), 3), np.nan)
     known = bone.name in vector_names(run.scalars, "force_on_")

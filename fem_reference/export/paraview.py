@@ -67,7 +67,7 @@ class _Frames:
     """The blocks of every frame of a comparison, with their common data."""
 
     def __init__(self, comparison: Comparison) -> None:
-        assert isinstance(comparison.context, MeasurementContext)  # of a muscle
+        assert isinstance(comparison.context, MeasurementContext)  # the comparison is of a muscle
         self.comparison, self.setup, self.context = comparison, comparison.setup, comparison.context
         self.case, self.reference = casefile.muscle(comparison.scene), comparison.reference
         self.results, self.within = _states(comparison), None

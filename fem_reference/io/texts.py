@@ -18,7 +18,7 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The most bytes of a file. A case file has some kB, a baseline 1.3 kB a frame; its content takes up to thirty times as much memory.
+# The most bytes of a file: a case file has some kB, a baseline 1.3 kB per frame. In memory it takes up to thirty times as much.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
 # The most levels of nested tables and lists; case files have up to 6.

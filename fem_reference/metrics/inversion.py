@@ -17,7 +17,7 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Shares of the surface, by its area at rest, less those of the reference [%]: ``inside_out``, triangles whose outer side
+    """Shares of the surface, by its area at rest, minus those of the reference [%]: ``inside_out``, triangles whose outer side
     faces a part of the body that is turned inside out, and ``overlapping``, those that lie inside another part of it.
 
     NaN in a frame where a triangle has collapsed: it has no outer side.

@@ -41,7 +41,7 @@ class Asked:
 
     @property
     def command(self) -> str:
-        """The command line that makes it, without options that change no number on it."""
+        """The command line that makes the page, without options that do not change its numbers."""
         return shlex.join(["fem-reference", self.verb, *(word for part in self.parts for word in part.words)])
 
     @property

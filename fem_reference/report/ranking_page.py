@@ -16,7 +16,7 @@ from fem_reference.report.drawings import Drawing, drawn, logarithmic, looks
 from fem_reference.report.pages import Page
 from fem_reference.report.words import under_load
 
-# Columns: metric, statistic, heading, unit.
+# The columns of the tables of scenes: metric, statistic, heading, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
 # Columns of the first table, over all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
@@ -93,7 +93,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
 def _drawing(table: Table) -> Drawing:
     """Deviation of the surface against the time of a frame, for every solver on every scene; with legends of colours and marks."""
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
-    # The reference first.
+    # The reference is drawn first.
     colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))
     marks = {scenario.case: _MARKS[i % len(_MARKS)] for i, scenario in enumerate(table.scenarios)}
 

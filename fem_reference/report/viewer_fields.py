@@ -48,7 +48,7 @@ class Fields:
     @property
     def context(self) -> MeasurementContext:
         """The measurement context of all runs."""
-        assert isinstance(self.comparison.context, MeasurementContext)  # of a muscle
+        assert isinstance(self.comparison.context, MeasurementContext)  # the comparison is of a muscle
         return self.comparison.context
 
     @cached_property

@@ -39,7 +39,7 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point farther outside the tets than this share of the mesh's diagonal counts as outside; a nearer one is rounding.
+# A point counts as outside the tets if its distance from them exceeds this share of the mesh's diagonal; less may be rounding.
 ROUNDING = 1e-9
 
 
@@ -127,7 +127,7 @@ class Results:
         there = self.names(state)
         for name in names or ():
             if name not in there:
-                raise InputError("names", f'"{name}"', f"one of the results of this run: {', '.join(there)}")
+                raise InputError("names", f'"{name}"', f"one of {', '.join(there)}, which this run has")
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:

@@ -25,7 +25,7 @@ FOLDER, FIELD = "state", "field"
 VALUES = "psi"  # the name of a field itself
 # The most memory [bytes] for the arrays of a file: a state of a million tetrahedra.
 MOST_BYTES = 2**30
-# Arrays by name.
+# The arrays of a file by name.
 Arrays = dict[str, NDArray[Any]]
 _ARRAYS = ("displacement", "pressure", "before", "rate")
 _IN_SITU = ("response", "response_pressure")

@@ -1,4 +1,4 @@
-"""Frames and runs of one of several muscles, taken from those of all. Scalars of one muscle have its name before a dot."""
+"""Frames and runs of one of several muscles, taken from those of all. Names of its scalars begin with its name and a dot."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -26,7 +26,7 @@ _OF_ALL = (
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
     """The part of a ``frame`` of several muscles for one of them; a force on it by one of the ``others`` has the other's name."""
-    assert frame.surface is not None  # of the reference
+    assert frame.surface is not None  # frames of the reference have one
     assert frame.fibres is not None
     forces, moments = (
         {own: vector for key, vector in some.items() if (own := _own(key, span.name, others))}

@@ -152,7 +152,7 @@ class Writer:
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
             unknown: list[float | None] = [None] * (
                 len(self.state["numbers"]) - 1
-            )  # in frames before an effect was added
+            )  # unknown in frames that were stored before an effect was added
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)

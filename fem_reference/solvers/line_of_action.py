@@ -78,7 +78,7 @@ class Shortest:
         if wrong:
             self.wrong = Trouble("diverged", wrong)
         else:
-            points = paths.at(passed.part, passed.share)  # as many as the fibres have
+            points = paths.at(passed.part, passed.share)  # as many points as the fibres have
             lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
             scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
             self.found = Frame(number, None, fibres=points, scalars=scalars)
@@ -93,7 +93,7 @@ class Shortest:
         return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside an obstacle or a path not found; None without."""
+        """The trouble with a fixed point inside an obstacle or a path that was not found; None where there is none."""
         return self.wrong
 
     def frame(self, _: int) -> Frame:

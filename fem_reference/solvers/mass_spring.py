@@ -27,7 +27,7 @@ from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
-# The default time step over the greatest stable one.
+# The ratio of the default time step to the greatest stable one.
 SHARE_OF_STABLE = 0.9
 # A run with more steps per frame number than this is refused: with 3,000 tetrahedra a frame number would take over two seconds.
 _MOST_STEPS = 100_000
@@ -159,7 +159,7 @@ class MassSpringModel:
         return points
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the boundary of the tetrahedra; None without."""
+        """The trouble with the boundary of the tetrahedra; None where there is none."""
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:

@@ -161,7 +161,7 @@ def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
     if settings.anisotropy is None:
         return found
     fibres = setup.rest.fibres
-    assert fibres is not None  # as the solver asks for them
+    assert fibres is not None  # with these settings the solver gets fibres
     return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, fibres))
 
 
@@ -190,7 +190,7 @@ def advance(
 
 _EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
-# The report's text with the settings of its program.
+# The algorithm of the report's text with the settings of its program.
 _TABLE = TableRow(
     "PBD",
     "pbd",

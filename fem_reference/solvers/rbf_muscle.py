@@ -121,7 +121,7 @@ class RbfMuscle(MovingSurface):
         self.nearest, self.beside = vertices[nearest], np.exp(-((away / np.median(self.fitted.radii)) ** 2))
         first, last = (rest.points[setup.attached[i].vertices].mean(axis=0) for i in (0, -1))
         direction = (last - first) / max(float(np.linalg.norm(last - first)), np.finfo(float).tiny)
-        self.along = np.broadcast_to(direction, self.cloud.nodes.shape)  # from the first attachment to the last
+        self.along = np.broadcast_to(direction, self.cloud.nodes.shape)  # from the first attachment towards the last
         self.volume = enclosed_volume(rest.points, rest.triangles)
         self.nodes = self.cloud.nodes
         self.cost["unknowns"] = 4.0 * settings.gaussians

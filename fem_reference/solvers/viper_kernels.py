@@ -90,7 +90,7 @@ def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float
     steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest
     square = a * a + a * b + b * b
-    # Slopes of C by the length and by both radii.
+    # The derivatives of C by the length and by both radii.
     cone = np.pi / 3 / rest
     along, of_a, of_b = cone * square, cone * lengths * (2 * a + b), cone * lengths * (a + 2 * b)
     step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)

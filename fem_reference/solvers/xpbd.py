@@ -3,12 +3,12 @@
 Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
 resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step.
-Here too few sweeps give too soft a muscle, enough of them an implicit Euler step, and the equilibrium depends on the time step
-only as far as directions change within a step. All this holds where the sweeps resolve a step: ``sqrt(k / m) dt`` of the stiffest
-edges below about 1, or more sweeps. In the settings for Table 5.1 it is 3 (1.1 for half of the edges) with one sweep: twice the
-sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
+Here too few sweeps give too soft a muscle, enough sweeps give an implicit Euler step, and the equilibrium depends on the time step
+only as far as directions change within a step. All this holds where the sweeps resolve a step: with ``sqrt(k / m) dt`` of the
+stiffest edges below about 1, or with more sweeps. In the settings for Table 5.1 it is 3 (1.1 for half of the edges) with one sweep:
+twice the sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
 
-Frame number n is the state after iteration n, ``frame_time`` after the one before; meanwhile bones move steadily.
+Frame number n is the state after iteration n, ``frame_time`` after the one before; meanwhile bones move at constant velocity.
 """
 
 import math

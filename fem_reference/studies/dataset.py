@@ -187,7 +187,7 @@ def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
 
 def _inside(run: Run, case: MuscleCase) -> Arrays:
     """The arrays of the tetrahedra."""
-    assert run.folder is not None  # from the store
+    assert run.folder is not None  # it is in the store
     mesh, fibre = states.read_rest(run.folder)
     results = Results(mesh, case.effects, states.StoredStates(run.folder, run.numbers), fibre)
     tets, middle = np.arange(len(mesh.tets)), np.full((len(mesh.tets), 4), 0.25)

@@ -166,7 +166,7 @@ class Bench[C: Case]:
             self._begin()
             assert run.folder is not None  # it is in the store
             folder = self.folder(choice, place)
-            with making.locked(folder):  # it continues the run that was stopped
+            with making.locked(folder):  # the new run continues the stopped one
                 pass_on(run.folder, folder)
 
     def _stored(self, wanted: Wanted) -> Run | None:
@@ -211,7 +211,7 @@ class Bench[C: Case]:
         watch = self._watched(run.solver)
         if watch is None or run.origin.get("watched") == watch.names:
             return ()
-        assert run.folder is not None  # from the store
+        assert run.folder is not None  # it is in the store
         return next(filter(None, making.seen(watch, run.folder, run.numbers)), ()) or watch.end()
 
     def _solved(self, wanted: Wanted, given: CaseSetup) -> Run:

@@ -32,7 +32,7 @@ from fem_reference.studies.variations import on_tetrahedra, with_contact, with_d
 log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
-# Files whose code makes error bars, beside the metrics.
+# Files, besides the metrics, whose code makes error bars.
 _MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with

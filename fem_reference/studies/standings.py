@@ -33,7 +33,7 @@ CASES = (
     *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
     *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
 )
-# The processor time [s] that a solver may take on a case.
+# The default limit of processor time [s] for a solver on a case.
 TIME_LIMIT = 600.0
 # The entry for the machine where frames were submitted with their time.
 THEIRS = "as stated by its authors"

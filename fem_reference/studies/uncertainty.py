@@ -86,7 +86,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
     """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have answers."""
     whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
-    assert isinstance(context, MeasurementContext)  # of a muscle
+    assert isinstance(context, MeasurementContext)  # the case is of a muscle
     yield _surface(comparison, context, design, whole)
     measured = [change(run, context, {name.split(".")[0] for name in QUANTITIES}) for run in whole]
     for name in QUANTITIES:

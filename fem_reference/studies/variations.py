@@ -27,7 +27,7 @@ from fem_reference.scenes.muscle import MuscleCase, VertexList
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 # Sizes of tetrahedra relative to the case's, each with every number of refinements up to the case's own.
 _SIZES = (2.0, 1.6, 1.25, 1.0)
-# The reference's settings are varied on the mesh before the last refinement or, without refinement, on tetrahedra of this factor.
+# The reference's settings are varied on the mesh before the last refinement or, without one, on tetrahedra larger by this factor.
 _COARSER = 1.6
 _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)

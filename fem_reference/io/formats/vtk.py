@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.soup import DataSet, Soup, check_lengths, joined, only_triangles
 
-_TRIANGLE = 5  # of VTK's cell types
+_TRIANGLE = 5  # VTK's number for this type of cell
 _NO_ROOM = 20007  # VTK's number for a full disk; other errors of the system keep their numbers
 LINES = (".vtk", ".vtp")  # the suffixes of the formats that have polylines
 _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}

@@ -84,7 +84,7 @@ def march(
             if goal == frame and recall(frame):
                 at = goal
             while at < goal:
-                left = goal - at  # in equal steps of about ``step``: none is tiny
+                left = goal - at  # divided into equal steps of about ``step``, so that none is tiny
                 size = left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
                 then = goal if size == left else at + size
                 result = attempt(then)

@@ -124,7 +124,7 @@ class _Watch:
 
 
 def _last_line(printed: IO[bytes]) -> str:
-    """The last line that was printed, empty without one."""
+    """The last line that was printed; empty where there is none."""
     size = printed.seek(0, os.SEEK_END)
     printed.seek(max(0, size - _TAIL))
     lines = [line for line in printed.read().decode(errors="replace").splitlines() if line.strip()]

@@ -195,7 +195,7 @@ class Hard(Record):
 
 
 def choices() -> dict[str, SolverChoice]:
-    """Settings for hard cases, by solver: its own here, else those of the first candidate of Table 5.1 that has it."""
+    """Settings for hard cases by solver: its own for these, else those of the first candidate of Table 5.1 with that solver."""
     found = {name: SolverChoice(solver=name, **settings) for name, settings in _OWN.items()}
     for candidate in solvers.in_table():
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))

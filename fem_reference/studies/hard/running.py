@@ -35,7 +35,7 @@ from fem_reference.studies.law_split import LAW
 log = logging.getLogger(__name__)
 
 LONGER = 600.0  # the limit of processor time [s] of a case's runs in several numbers of load steps or on several meshes
-# A place at rest [mm] in messages.
+# The pattern by which messages state a place at rest [mm].
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
