@@ -90,7 +90,7 @@ def both_orders(material: Material) -> float:
 
 
 LOOCKE, WALTER, TAKAZA = "van_loocke_2006", "walter_2022", "takaza_2013"
-_READ = "The text that was read has no standard deviation: 0.05, as its numbers have two digits."
+_READ = "The text that was read states no standard deviation: 0.05, as its values have two digits."
 _TENSION_ONLY = (
     "Fibres that pull in tension only are slack in compression along them, where the matrix alone resists; across the load they "
     "are stretched and resist."
@@ -137,21 +137,21 @@ def _confinement() -> Quantity:
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
     title = "Strip at a stretch of 1.1: stress along the fibres over that across them"
-    because = "Both stresses are from memory, without deviations: as much as the ratio itself."
+    because = "Both stresses are from memory, without deviations: the tolerance equals the ratio."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
     return Quantity("strip_stiffness_ratio", title, TAKAZA, of, facts, truth, truth, because, _BARE)
 
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
-    because = "An order: 1 where it is met by 1 % and more, 0 where not."
+    because = "The answer is yes (1: the difference is at least 1 %) or no (0)."
     title = f"Cube in compression: {title}"
     return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit, is_order=True)
 
 
 _MIDWAY, _ACROSS = find(LOOCKE, "softest_angle", ""), find(WALTER, "stiffest_angle", "")
 _SOFTEST, _STIFFEST = partial(_extreme, degrees=45.0, softest=True), partial(_extreme, degrees=90.0, softest=False)
-_OTHER = "the other way across"
+_OTHER = "in the other transverse direction"
 
 QUANTITIES = (
     _squeezed("cube_poisson_along", "along its fibres: Poisson ratio", "both strains across", 0, 1),
