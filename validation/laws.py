@@ -23,7 +23,7 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 class Law(Protocol):
-    """What a body is made of."""
+    """A material law: its energy and its stress."""
 
     def energy(self, F: Floats, fibre: Floats) -> float:
         """Energy per rest volume [MPa]."""
@@ -33,7 +33,7 @@ class Law(Protocol):
 
 
 def _invariants(F: Floats) -> tuple[float, float, float]:
-    """J, I1 and I2, not isochoric."""
+    """J and the invariants I1 and I2, which are not isochoric."""
     C = F.T @ F
     return np.linalg.det(F), np.trace(C), (np.trace(C) ** 2 - np.trace(C @ C)) / 2
 
@@ -184,7 +184,7 @@ class Prestretched:
 
 @dataclass(frozen=True)
 class Together:
-    """Several laws side by side: their energies add up."""
+    """Several laws in parallel: their energies add up."""
 
     laws: tuple[Law, ...]
 

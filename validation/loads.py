@@ -20,7 +20,7 @@ def squeezed_volume(mu: float, bulk: float, stretch: float) -> float:
 
 
 def squeeze_force(mu: float, bulk: float, stretch: float, area: float) -> float:
-    """Of a plate on the block [N], above zero where it pulls: ``mu J^(-2/3) (stretch - J / stretch^2) area``, ``area`` at rest
+    """The force of a plate on the block [N], positive in tension: ``mu J^(-2/3) (stretch - J / stretch^2) area``, ``area`` at rest
     [mm2]; J from :func:`squeezed_volume`.
     """
     J = squeezed_volume(mu, bulk, stretch)
@@ -44,7 +44,7 @@ def confined_stretch(mu: float, bulk: float, stress: float) -> float:
 
 
 def column_top(mu: float, bulk: float, weight: float, height: float) -> float:
-    """Displacement [mm] of the top of a column in a smooth rigid box that stands under its own ``weight`` per rest volume
+    """Displacement [mm] of the top of a column in a rigid frictionless box that stands under its own ``weight`` per rest volume
     [N/mm3]; ``height`` H [mm] at rest.
 
     Balance ``P(Z) = -weight (H - Z)``; the displacement, the integral of ``l - 1`` over Z, is by parts

@@ -90,7 +90,7 @@ def both_orders(material: Material) -> float:
 
 
 LOOCKE, WALTER, TAKAZA = "van_loocke_2006", "walter_2022", "takaza_2013"
-_READ = "The text that was read has no standard deviation: 0.05, as its numbers have two digits."
+_READ = "The text that was read states no standard deviation: 0.05, as its values have two digits."
 _TENSION_ONLY = (
     "Fibres that pull in tension only are slack in compression along them, where the matrix alone resists; across the load they "
     "are stretched and resist."
@@ -151,7 +151,7 @@ def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], l
 
 _MIDWAY, _ACROSS = find(LOOCKE, "softest_angle", ""), find(WALTER, "stiffest_angle", "")
 _SOFTEST, _STIFFEST = partial(_extreme, degrees=45.0, softest=True), partial(_extreme, degrees=90.0, softest=False)
-_OTHER = "the other way across"
+_OTHER = "in the other transverse direction"
 
 QUANTITIES = (
     _squeezed("cube_poisson_along", "along its fibres: Poisson ratio", "both strains across", 0, 1),

@@ -1,7 +1,7 @@
 /* Pairs of triangles that may intersect or touch: all that do, and few that do not.
 
-   Boxes are met in a regular grid. A pair is left out only where a plane certainly separates its triangles, or where they share an
-   edge. Coordinates enter by their differences, which are rounded relatively: SURE is thousands of such roundings.
+   A regular grid finds boxes that meet. A pair is left out only if a plane certainly separates its triangles, or if they share an
+   edge. Only differences of coordinates are used, with relative rounding errors: SURE is thousands of these.
 */
 
 #include <math.h>
@@ -76,7 +76,7 @@ static void place(const Grid *grid, Box *box)
     }
 }
 
-/* At most about four cells a box, and no smaller than boxes are on average. */
+/* About four cells per box at most, each no smaller than the average box. */
 static void measure(Grid *grid)
 {
     double extent = 0, volume = 1;
@@ -100,7 +100,7 @@ static void cross(const double *a, const double *b, double *found)
         found[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* Whether all of a is certainly above all of b along a normal, or below; within is what heights are sure to. */
+/* Whether all of a is certainly above all of b along a normal, or below; within bounds the error of heights. */
 static int parts(const double *normal, double (*a)[3], double (*b)[3], double within)
 {
     double lows[2] = {INFINITY, INFINITY}, highs[2] = {-INFINITY, -INFINITY};
@@ -113,7 +113,7 @@ static int parts(const double *normal, double (*a)[3], double (*b)[3], double wi
     return lows[0] - highs[1] > within || lows[1] - highs[0] > within;
 }
 
-/* 1 or -1 where points are certainly all above or all below the plane of that normal through the origin, else 0. */
+/* 1 or -1 if all points are certainly above or all below the plane through the origin with this normal, else 0. */
 static int side(const double *normal, double (*points)[3], int count, double within)
 {
     int above = 0, below = 0;
@@ -138,8 +138,8 @@ static int parted_at_corner(double (*a)[3], double (*b)[3], double size)
         double (*one)[3] = turn ? b : a, (*other)[3] = turn ? a : b;
         cross(one[0], one[1], across);
         if (side(across, other, 2, within * size))
-            return 1; /* all of it beside the plane of this one */
-        for (int k = 0; k < 2; k++) { /* beyond an edge of this one, upright on its plane */
+            return 1; /* the other is on one side of this one's plane */
+        for (int k = 0; k < 2; k++) { /* the plane through an edge, normal to this one's */
             cross(across, one[k], normal);
             if (side(normal, other, 2, within * size * size) * side(normal, one + 1 - k, 1, within * size * size) < 0)
                 return 1;
@@ -167,8 +167,8 @@ static int parted(double (*a)[3], double (*b)[3], double size)
     return 0;
 }
 
-/* Whether triangles s and t may meet but at a common corner; names of points are compared where both are of one surface. Their
-   boxes, which touch, are as large as size together. */
+/* Whether triangles s and t may meet elsewhere than at a common corner; point indices are compared if both are of one surface. The
+   sizes of their boxes, which touch, add up to size. */
 static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t t, double size)
 {
     const int64_t *names = one->corners + 3 * s, *others = other->corners + 3 * t;
@@ -182,7 +182,7 @@ static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t
             }
     if (shared > 1)
         return 0;
-    if (!(size > 1e-50)) /* powers of it would be rounded absolutely */
+    if (!(size > 1e-50)) /* its powers would underflow */
         return 1;
     double a[3][3], b[3][3];
     const double *origin = one->points + 3 * names[mine];
@@ -191,7 +191,7 @@ static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t
             a[k][i] = one->points[3 * names[(mine + k) % 3] + i] - origin[i];
             b[k][i] = other->points[3 * others[(its + k) % 3] + i] - origin[i];
         }
-    size *= 6; /* of sums and differences of three corners too */
+    size *= 6; /* covers sums and differences of three corners */
     return !(shared ? parted_at_corner(a + 1, b + 1, size) : parted(a, b, size));
 }
 
@@ -200,7 +200,7 @@ static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t
         for (int y = (box).first[1]; y <= (box).last[1]; y++)                                \
             for (int64_t z = (box).first[2], at = ((int64_t)x * grid->size[1] + y) * grid->size[2] + z; z <= (box).last[2]; z++, at++)
 
-/* Sort boxes into the cells of the grid; 0 without memory. */
+/* Sort boxes into the cells of the grid; 0 if out of memory. */
 static int fill(Grid *grid)
 {
     int64_t cells = (int64_t)grid->size[0] * grid->size[1] * grid->size[2];
@@ -227,7 +227,7 @@ void forget(Grid *grid)
     free(grid);
 }
 
-/* The triangles of a surface that has some, sorted by their places; NULL without memory. To be forgotten. */
+/* The triangles of a non-empty surface, sorted into a grid; NULL if out of memory. The caller must forget() it. */
 Grid *sorted(Surface surface)
 {
     Grid *grid = calloc(1, sizeof *grid);
@@ -245,7 +245,7 @@ Grid *sorted(Surface surface)
     return NULL;
 }
 
-/* Add the pair s and t where it may meet; each once, in the cell of the greatest low corner of its boxes. */
+/* Add the pair s and t if they may meet; each once, in the cell of the greater of the low corners of both boxes. */
 static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *its, const int *cell)
 {
     for (int i = 0; i < 3; i++)
@@ -285,7 +285,7 @@ static void add_of_two(Found *found, const Grid *grid)
 }
 
 /* Fill up to room pairs (room, 2) of triangles of two surfaces, or of one with itself, each pair once; grid is the other, sorted.
-   Their number, which may be more than room. */
+   The result is the number of pairs, which may exceed room. */
 int64_t near_pairs(Surface one, Surface other, const Grid *grid, int itself, int64_t room, int64_t *pairs)
 {
     Found found = {&one, &other, room, 0, pairs};

@@ -63,7 +63,7 @@ def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
     state = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-11).last
     # On an area of 1 mm2.
     most = state.scalars["touching_pressure"] / -float(state.forces["high_z1"][2])
-    return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} of the mean one")
+    return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} times the mean")
 
 
 def _quarter(n: int) -> Cells:

@@ -10,8 +10,6 @@ import meshio
 import numpy as np
 import pytest
 
-from fem_reference.export import febio
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
@@ -136,5 +134,3 @@ def test_regions_are_exported_with_what_acts_in_them(scene: MuscleCase, built: M
         found = meshio.read(tmp_path / name).cell_data["region_tendon"][0]
         assert np.array_equal(found, problem.regions["tendon"](middles))
     assert 0 < found.mean() < 0.5
-    with pytest.raises(InputError, match=r'effect\[0\]\.in: got "not tendon", want a law of the whole muscle'):
-        febio.check(there)
