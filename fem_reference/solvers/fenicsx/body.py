@@ -99,7 +99,7 @@ class AssembledBody:
         """The trouble *diverged* where the energy has no value in the present state."""
         if np.isfinite(self.energy()):
             return None
-        return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
+        return Trouble("diverged", "to a state in which the energy is not a number: a law has no value there")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes at the positions to which ``moved`` maps their rest points (n, 3) [mm]."""

@@ -133,7 +133,7 @@ class March:
         if not smallest > 0:
             return Trouble("inverted", f"det F fell to {smallest:.3g}")
         if not np.isfinite(self.equations.energy(unknowns, frame)):
-            return Trouble("diverged", "to a state in which the energy is no number")
+            return Trouble("diverged", "to a state in which the energy is not a number")
         return None
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
