@@ -176,7 +176,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
-    """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
+    """Raise InputError where two entries share a name, under which forces are reported, or a spring stiffness is not positive."""
     names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"

@@ -102,7 +102,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
         shares = walked[going] / np.maximum(lengths[going], least)
         gaps = bone.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
-        # The gradient of a sampled distance has length 1 up to a tenth; beyond its grid strides are short.
+        # The gradient of a sampled distance has length 1 up to a tenth; beyond the grid of the distance, strides are short.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest
