@@ -22,10 +22,10 @@ class CollagenAcross(Energy):
     ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``; the mean is half the
     trace of C there, ``mean^2 - spread^2`` its determinant; eight angles are summed.
 
-    Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019, doi
-    10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here the
-    directions are only those in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000, doi
-    10.1023/A:1010835316564.
+    Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019,
+    doi 10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here the
+    directions are only those in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000,
+    doi 10.1023/A:1010835316564.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

@@ -38,7 +38,7 @@ class FibreActive(Ramped, Energy):
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which active fibres straighten the muscle, or shorten it where they can."""
+        """The distance by which active fibres straighten the muscle, or by which they shorten it if it is free to shorten."""
         pull = scene.greatest(self) * self.stress
         return fibre_indicator(scene, pull, scene.straighten(pull))
 

@@ -1,4 +1,4 @@
-"""Isotropic elastic matrix, without its resistance to volume change."""
+"""Isotropic elastic matrix, without resistance to volume change."""
 
 from typing import Any, ClassVar
 

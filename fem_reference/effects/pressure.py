@@ -1,4 +1,4 @@
-"""Fluid pressure on a part of the surface, perpendicular to it as it moves (a follower load)."""
+"""Fluid pressure on a part of the surface, which stays perpendicular to the surface as that moves (a follower load)."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar

@@ -20,7 +20,7 @@ class Traction(Ramped, Load):
     force: PressureVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it extends the length."""
+        """The distance by which it extends the muscle."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
         return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)

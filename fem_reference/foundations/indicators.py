@@ -1,7 +1,7 @@
 """Indicators of the effects that a case needs, estimated before anything is solved.
 
-Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002, doi
-10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] by an effect, estimated from rest
+Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
+doi 10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] by an effect, estimated from rest
 geometry, motion and parameters, and compared with the accuracy. An isometric contraction causes stress and no displacement.
 """
 

@@ -160,7 +160,7 @@ def check_corners(surface: Surface) -> None:
 
 
 def check_closed(surface: Surface) -> Surface:
-    """The surface, outward, if it bounds one body: finite, closed, manifold, consistently oriented, every point used.
+    """The surface, outward, if it bounds one body: finite, closed, manifold and consistently oriented, with every point used.
 
     InputError otherwise, with the number of wrong edges, vertices or parts, and the place of the first or smallest of them.
     """

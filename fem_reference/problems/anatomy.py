@@ -33,8 +33,8 @@ _SIDE = 2.0
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices (k,) of the muscle's ``surface``, sorted, that ``case.attachment[i]`` selects, with its
-    ``bone_surface``; InputError names the unusable key of the case, or the file and row (comment lines not counted).
+    """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` selects, to a bone with ``bone_surface``.
+    InputError names the unusable key of the case, or the file and row (not counting comment lines).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -86,7 +86,7 @@ def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
 
 
 def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
-    """The vertices in a file of ``vertex[,value]`` rows; the surface has ``count`` of them."""
+    """The vertices in a file with rows ``vertex[,value]``; the surface has ``count`` vertices."""
     vertices = []
     for number, row in enumerate(files.read_rows(path), start=1):
         if number == 1 and _is_header(row[0]):
@@ -255,7 +255,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    """The fibres in files of a case, or between surface fibres in its files; None where it has none."""
+    """The fibres in the files of a case, or those between the surface fibres in its files; None where it has neither."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
     if (asked := case.fibres.chmd) is not None and asked.heads is not None:

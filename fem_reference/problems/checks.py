@@ -120,7 +120,7 @@ def _check_many(place: str, given: Any, kind: type, want: str) -> None:
 
 
 def _check_rest(body: Body) -> None:
-    """Raise InputError where an optional part of a body is of the wrong type."""
+    """Raise InputError where an optional part of a body has the wrong type."""
     if body.interval is not None and not (_is_number(body.interval) and body.interval > 0):
         raise InputError("interval", said(body.interval), "a time above 0 s, or None")
     for name in ("fibre", "start"):
@@ -176,7 +176,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
-    """Raise InputError where two entries share a name, under which forces are reported, or springs would repel."""
+    """Raise InputError where two entries share a name, under which forces are reported, or a spring stiffness is not positive."""
     names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
@@ -263,7 +263,7 @@ def _check_start(body: Body) -> None:
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:
-    """Corners that two regions share and the middles of edges (n, 3) [mm]."""
+    """The corners that two regions share, and the middles of the edges that they share (n, 3) [mm]."""
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:

@@ -1,4 +1,4 @@
-"""Contact with bones: the bones around a body, and the law of the contact pressure."""
+"""Contact with bones: the bones around a body, and the law of contact pressure."""
 
 import logging
 from collections.abc import Callable
@@ -102,7 +102,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
         shares = walked[going] / np.maximum(lengths[going], least)
         gaps = bone.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
-        # The gradient of a sampled distance has length 1 up to a tenth; beyond its grid strides are short.
+        # The gradient of a sampled distance has length 1 up to a tenth; beyond the grid of the distance, strides are short.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest
@@ -119,7 +119,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 
 
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
-    """InputError where a bone is inside the muscle, as no force moves it out, or too thin for contact points ``apart`` [mm]."""
+    """Raise InputError for a bone that is inside the muscle, as no force would move it out, or too thin for points ``apart``."""
     if signed_distances(surface.points, muscle).max() < 0:
         raise InputError(place, "a bone wholly inside the muscle", "one that is not")
     if not shape.half_thickness >= _THINNEST * apart:
@@ -128,7 +128,7 @@ def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, a
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:
-    """Raise InputError where most of the unattached surface is exempt from contact; warn where much of it is."""
+    """Raise InputError where most of the unattached surface is exempt from contact; log a warning where much of it is."""
     got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")

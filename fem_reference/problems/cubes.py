@@ -34,7 +34,7 @@ class CubeState:
 
 
 def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats:
-    """The derivative (3, 3) [MPa] of the energies of ``acting`` effects with respect to ``F`` (3, 3), exact up to rounding."""
+    """The derivative (3, 3) [MPa] of the energies of all ``acting`` effects with respect to ``F`` (3, 3), exact up to rounding."""
     jets = variables(F.reshape(9, 1), curved=False)
     rows = [jets[3 * i : 3 * i + 3] for i in range(3)]
     energy = total_energy([(one, 1.0) for one in acting], State(F=rows, fibre=tuple(fibre), functions=JET_FUNCTIONS))

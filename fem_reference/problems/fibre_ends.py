@@ -130,9 +130,9 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
-    """The ``lines``, those that end beside their attachment extended straight to its closest point, in steps of at most 2 mm.
+    """The ``lines``; those that end beside their attachment are extended straight to its closest point in steps of at most 2 mm.
 
-    An extension may leave the muscle; the caller moves its points back into it.
+    An extension may leave the muscle; the caller moves its points back inside.
     """
     parts = []
     for i, (first, last) in enumerate(ends.beside):
@@ -144,7 +144,7 @@ def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
 
 
 def _steps(start: Floats, end: Floats) -> Floats:
-    """Points (n, 3) [mm] evenly from ``start``, without it, to ``end``."""
+    """Points (n, 3) [mm], evenly spaced, from ``start``, which is left out, to ``end``."""
     return np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / REACHES)) + 1)[1:]
 
 

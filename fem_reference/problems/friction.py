@@ -1,4 +1,4 @@
-"""Coulomb's friction of points on a surface: a point sticks by a spring, and slides where its force would exceed the limit."""
+"""Coulomb's friction of points on a surface: a spring holds a point, which slides where its force would exceed the limit."""
 
 from collections.abc import Iterable
 from math import isfinite

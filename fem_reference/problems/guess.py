@@ -61,8 +61,8 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 
 def strain(points: Floats, moved: Floats) -> float:
-    """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976, doi
-    10.1107/S0567739476001873), root mean square, divided by that of the distances from the middle; 1 at most.
+    """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976,
+    doi 10.1107/S0567739476001873), root mean square, divided by that of the distances from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
     left, _, right = np.linalg.svd(now.T @ rest)

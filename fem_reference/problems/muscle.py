@@ -1,4 +1,4 @@
-"""Muscles filled with tetrahedra and fibres, with their effects, and as finite element bodies attached to bones."""
+"""Muscles filled with tetrahedra and fibres, with their effects, and their finite element bodies, which are attached to bones."""
 
 import time
 from dataclasses import dataclass, field, fields, replace
@@ -60,7 +60,7 @@ from fem_reference.problems.tendons import pulling
 from fem_reference.problems.touching import with_itself
 from fem_reference.scenes.muscle import CaseBone, MuscleCase
 
-RELAXING = 10  # the number of frame numbers before the first over which an overlap at rest is removed
+RELAXING = 10  # an overlap at rest is removed over this many frame numbers before the first
 
 
 def kept_meshes() -> Path | None:

@@ -47,7 +47,7 @@ def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
 
 
 def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalProblem:
-    """The problem with other ``frames``."""
+    """The problem ``built`` with other ``frames``."""
     if isinstance(built, MuscleProblem):
         return replace(built, frames=frames)
     return replace(built, problems={name: replace(one, frames=frames) for name, one in built.problems.items()})

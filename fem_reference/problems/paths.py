@@ -60,8 +60,8 @@ def radially(
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length``
-    the angle is per mm along the axis from the centre: a twist.
+    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length`` the
+    angle is that per mm along the axis from the centre, as in a twist.
     """
 
     axis: tuple[float, float, float]
@@ -117,7 +117,7 @@ class Follows:
     pose: Callable[[float], Floats]
 
     def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
+        """The displacements (n, 3) [mm] of rest points (n, 3) at a frame number."""
         return apply(self.pose(frame), points) - points
 
     def turning(self, points: Floats) -> Turning | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 
-# The three problems that solvers take: a muscle, a scalar field, or a body of any shape.
+# The names of the functions of solvers for the three problems: a muscle, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
 # The empty surface of a problem that has none.
 NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))

@@ -193,7 +193,7 @@ def _square(flat: Floats, half: float) -> Floats:
 
 
 def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats:
-    """Points (n, 2) between a side of the square, (axis, sign) of its normal, and the circle: x outward, y along the side."""
+    """Points (n, 2) between the circle and the side of the square with the normal ``side`` (axis, sign): x outward, y along it."""
     axis, sign = side
     along = low + (1 - low) * unit[:, 1]
     square = _square(np.stack([np.ones_like(along), along], axis=1), half)

@@ -139,7 +139,7 @@ class Watch:
 
     @property
     def names(self) -> list[str]:
-        """The effects that are watched for, with their parameters."""
+        """The names of the watched effects, with their parameters."""
         return [repr(one) for one in self.left]
 
     def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:

@@ -1,4 +1,4 @@
-"""Tendons that pull: springs from the surface of a muscle, around the ends of its fibres, to points of bones beyond it."""
+"""Tendons as springs that only pull, from the surface of a muscle around the ends of its fibres to points of bones beyond it."""
 
 from collections.abc import Iterator
 

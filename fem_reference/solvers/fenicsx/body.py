@@ -99,7 +99,7 @@ class AssembledBody:
         """The trouble *diverged* where the energy has no value in the present state."""
         if np.isfinite(self.energy()):
             return None
-        return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
+        return Trouble("diverged", "to a state in which the energy is not a number: a law has no value there")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes at the positions to which ``moved`` maps their rest points (n, 3) [mm]."""
@@ -116,7 +116,7 @@ class AssembledBody:
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the present state; restore it where Newton's method fails or a check refuses the result."""
+        """Solve at ``frame`` from the present state; restore that where Newton's method fails or a check refuses the result."""
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -195,7 +195,7 @@ class AssembledBody:
         return proved
 
     def arrive(self, frame: float) -> None:
-        """Take the present state as that of ``frame``; no load step led to it."""
+        """Take the present state, to which no load step led, as that of ``frame``."""
         self.at = frame
         for one in self.contacts:
             one.settle()

@@ -1,4 +1,4 @@
-"""Boundary conditions on a region, exact or by springs over its facets, at points of a skin or along tendons, and their forces."""
+"""Boundary conditions, exact or by springs, on the facets of a region, at points of a skin or along tendons; and their forces."""
 
 from typing import Any
 

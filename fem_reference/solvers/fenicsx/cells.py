@@ -68,7 +68,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The sparsity of the cells' entries, with the whole diagonal."""
+        """The sparsity of the entries of cells, extended by the whole diagonal."""
         starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
         entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
         has = csr_array(entries, shape=(self.count, self.size))

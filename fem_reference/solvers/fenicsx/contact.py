@@ -52,7 +52,7 @@ State = tuple[list[Pressed], float, Floats]
 
 
 class ContactForces:
-    """Contact of bones with this rank's points."""
+    """The contact of all bones with this rank's points."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Facets of a body's surface as it deforms: exact polynomials of their nodes, points on them, and the nearest places on them."""
+"""Facets of a body's surface as it deforms: polynomials between their nodes, points on facets, and nearest places on these."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any

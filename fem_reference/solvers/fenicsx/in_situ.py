@@ -1,6 +1,6 @@
 """Equilibrium at rest of a body in situ: the stress, the extended springs and the bones' pressure that balance its tension.
 
-All follow from the small displacement of an isotropic body, its ``response`` to the forces of the effects at rest. That body is
+All three follow from a small displacement, the ``response`` of an isotropic body to the forces of the effects at rest. That body is
 supported by its attachments and springs, and by bones that act as one-sided springs: a linear problem once the points that bones
 touch are known, which Newton's method finds as an active set.
 """

@@ -46,8 +46,8 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``. If ``lagged``, it solves by FGMRES preconditioned with an older factorisation. Once its
-    iterations, for one system or for all since, took longer than a new one, it is replaced. LDL^T of a symmetric matrix, else LU.
+    """Solves with the present ``matrix``. If ``lagged``, by FGMRES preconditioned with an older factorisation, replaced once its
+    iterations, for one system or all since, took longer than a new one. The factors are LDL^T of a symmetric matrix, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:

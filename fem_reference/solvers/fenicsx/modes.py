@@ -187,7 +187,7 @@ def _motion(body: AssembledBody, difference: float) -> Floats:
 
 
 def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
-    """Twice the energy of a ``mode`` by the present tangent."""
+    """Twice the energy of a ``mode`` with the present tangent."""
     image = mode.duplicate()
     body.system.matrix.mult(mode, image)
     return float(image.dot(mode))

@@ -84,7 +84,7 @@ class Newton:
         """The reason to stop iterating after ``residuals``, None where there is none."""
         iterations = len(residuals) - 1
         if not np.isfinite(residuals[-1]):
-            return f"went where a law, or what is prescribed, has no value in {iterations} iterations"
+            return f"reached a state where a law, or a prescribed path, has no value in {iterations} iterations"
         if iterations == self.most:
             return f"did not converge in {iterations} iterations"
         if (since := stalled(residuals)) > _PATIENCE:

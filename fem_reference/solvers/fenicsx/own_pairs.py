@@ -1,4 +1,4 @@
-"""Pairs of facets of one part of a surface that may touch each other: none that share a node, and none that face the same way."""
+"""Pairs of facets of one part of a surface that may touch each other: they share no node, and face each other."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -67,7 +67,7 @@ class Session:
 
 @contextmanager
 def session(ranks: int = 1) -> Iterator[Session]:
-    """A session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
+    """A context with a session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
     with scratch_folder() as folder:
         own = Session(folder, ranks)
@@ -98,7 +98,7 @@ def shared() -> Iterator[None]:
 
 
 def opened(ranks: int = 1) -> AbstractContextManager[Session]:
-    """The shared session, for one rank where there is one, else a new one. MissingSoftware where FEniCSx is not installed."""
+    """The shared session if there is one, for one rank; else a new one. MissingSoftware where FEniCSx is not installed."""
     common = _shared.get() if ranks == 1 else None
     if common is None:
         return session(ranks)

@@ -9,9 +9,9 @@ from fem_reference.solvers.fenicsx.system import System
 class Stability:
     """The inertia of the tangent of a ``system``, from an LDL^T factorisation that ``linear`` uses afterwards.
 
-    An unknown pressure p has the energy ``p (J - 1) - p^2 / 2K`` and takes one negative pivot of its own, -1/K. The other negative
-    pivots are the negative modes of the displacement, with the pressure that belongs to it (Haynsworth 1968, doi
-    10.1016/0024-3795(68)90050-5). Prescribed unknowns have pivots of 1.
+    An unknown pressure p has the energy ``p (J - 1) - p^2 / 2K``, which gives one negative pivot, -1/K. The other negative pivots
+    are the negative modes of the displacement, with the pressure that belongs to it (Haynsworth 1968,
+    doi 10.1016/0024-3795(68)90050-5). Prescribed unknowns have pivots of 1.
     """
 
     def __init__(self, system: System, linear: Factorised) -> None:

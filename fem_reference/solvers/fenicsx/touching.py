@@ -57,7 +57,7 @@ class TouchingForces:
             deep, most = max(seen, overlap(body, law)), law.smoothing + (max(seen, 0.0) if law.relaxed else 0.0)
             if deep > most:  # contact would neither see nor remove it
                 raise ArithmeticError(
-                    f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm, which may be {most:.3g} mm at most'
+                    f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm; at most {most:.3g} mm is allowed'
                 )
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):

@@ -215,8 +215,8 @@ class Pass:
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without those that ``met``
         it: they are behind the facet that they were near, or passed one on their path. Paths that begin inside, or so near that
-        flat pieces of a facet may be in front, are also followed from in front, raised by at most the reach of the facet, above
-        which points are met. Points that end in front of a facet passed only its flat pieces.
+        flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach, within which
+        points are met. Points that end in front of a facet passed only its flat pieces.
         """
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)

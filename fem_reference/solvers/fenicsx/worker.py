@@ -226,7 +226,7 @@ def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
 
 
 def report(folder: Path, found: Frame | Outcome) -> None:
-    """Write what the first rank ``found`` into a file in the ``folder`` and tell its name to the process that started this one."""
+    """Write what the first rank ``found`` into a file in the ``folder`` and report that to the process that started this one."""
     if MPI.COMM_WORLD.rank == 0:
         file = folder / f"report_{next(_numbers)}.pickle"
         file.write_bytes(pickle.dumps(found))

@@ -99,7 +99,7 @@ class _Tangent:
     matrix: Any
 
     def step(self, free: Ints, fixed: Ints, gap: Floats) -> Floats:
-        """The Newton step, where the ``fixed`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
+        """The Newton step in which the ``fixed`` unknowns change by ``gap``; RuntimeError where it is not unique."""
         step = np.zeros_like(self.unknowns)
         step[fixed] = gap
         rows = self.matrix[free]
@@ -133,7 +133,7 @@ class March:
         if not smallest > 0:
             return Trouble("inverted", f"det F fell to {smallest:.3g}")
         if not np.isfinite(self.equations.energy(unknowns, frame)):
-            return Trouble("diverged", "to a state in which the energy is no number")
+            return Trouble("diverged", "to a state in which the energy is not a number")
         return None
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
@@ -167,7 +167,7 @@ class March:
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
-        """The equations after ``step``, shortened until the forces on ``free`` unknowns are below ``limit``."""
+        """The equations after a ``step`` that is shortened until the forces on ``free`` unknowns are below ``limit``."""
         for halvings in range(_HALVINGS):
             unknowns = now.unknowns + 0.5**halvings * step
             then = _Tangent(unknowns, *self.equations.assembled(unknowns, frame))

@@ -25,7 +25,7 @@ Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A ``law`` at ``points``, which depends on the variables ``felt`` only."""
+    """A ``law`` at ``points`` that depends only on the variables with the indices ``felt``."""
 
     points: Points
     law: Law

@@ -50,7 +50,10 @@ def test_what_is_not_a_number_is_refused_at_once() -> None:
     assert not found.converged
     assert found.iterations == 0
     assert np.isnan(found.residuals[0])
-    assert found.detail == "Newton's method went where a law, or what is prescribed, has no value in 0 iterations"
+    assert (
+        found.detail
+        == "Newton's method reached a state where a law, or a prescribed path, has no value in 0 iterations"
+    )
 
 
 @pytest.mark.slow
