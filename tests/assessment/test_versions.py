@@ -127,7 +127,7 @@ def test_the_verb_compares_with_a_baseline_and_with_a_stored_run(tmp_path: Path,
         assert f"page: {out / name / 'against.html'}" in printed
         assert json.loads(facts.read_text())["counts"]["worse"] > 3
     html = next(out.glob(f"*against_{old.name}/against.html")).read_text()
-    assert "Differences in how they were made" in html
+    assert "Differences in provenance" in html
     for words, want in (
         (["--against", str(past), "--candidate", "pbd", "--solver", "xpbd"], "--against: got 2 candidates"),
         (["--against", str(tmp_path / "nowhere"), "--solver", "pbd"], "nowhere"),
