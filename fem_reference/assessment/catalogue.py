@@ -71,13 +71,14 @@ class Entry:
     ``measure`` finds the number that ``truth`` states, both in ``unit``. Its arguments are a lab, each count of a ``refinement``
     where there is one, and the values ``given`` by name. The number must come within ``within`` (in ``unit``, or of the truth's
     size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is that of the truth, ``kind`` its type.
-    ``negative_control`` names one mistake, with which ``wrong`` replaces a part of ``given``: it must fail. ``slow``: a
-    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify measures these.
+    ``negative_control`` names a deliberate mistake; with its values ``wrong`` in place of those ``given`` the entry must fail.
+    ``slow``: a measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify
+    measures these.
 
-    An entry of the kind "experiment" compares a model with a muscle: its word is within or outside the uncertainty of the
-    experiment, and neither is a failure. It fails where the value is no longer the ``pinned`` one. ``facts``: the measured numbers
-    from which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half; ``from_memory``: True
-    where a part of its model or of its source is from memory.
+    An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
+    experiment, and neither is a failure. It fails where the value is no longer the ``pinned`` one. ``facts``: the measured
+    numbers from which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half;
+    ``from_memory``: True where a part of its model or of its source is from memory.
     """
 
     name: str
@@ -126,9 +127,9 @@ def _finding(found: float | Finding) -> Finding:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry. ``word``: pass or fail, inconclusive without a truth, and for an experiment within or outside;
-    ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry and NaN without a measurement or a
-    truth; then the finding's note gives the reason.
+    """The result of an entry. ``word``: the verdict: pass or fail, inconclusive without a truth, and for an experiment within or
+    outside; ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry and NaN without a measurement
+    or a truth; then the finding's note gives the reason.
     """
 
     entry: Entry

@@ -79,7 +79,7 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
 
 def carried(run: Run, moved: Floats) -> dict[str, Floats]:
-    """Errors (f,), by statistic of the volume, of the surface volume of a ``run``. Its tetrahedra carry the surface, which lies
+    """Errors (f,) of the volume that the surface of a ``run`` encloses, by statistic. Its tetrahedra carry the surface, which lies
     partly outside them: the error is the difference of the changes of both volumes. Empty for a run without tetrahedra.
 
     It may cross zero: it counts as at least its average share of the surface's motion ``moved`` (f,) [mm].

@@ -36,7 +36,9 @@ _SHORTEST = 1e-9  # the share of all frames within which a long motion counts as
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, ``place`` in messages; ``scale``: an amount only."""
+    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, name in messages (``place``); ``scale``: True for an
+    amount.
+    """
 
     place: str
     at: Callable[[float], Floats]
@@ -122,7 +124,9 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
 
 
 class _Samples:
-    """Samples of things at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], lengths (m, p) [mm], less common motion."""
+    """Samples of things at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common
+    motion.
+    """
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
         self.things, self.frames, self.size = things, frames, size

@@ -44,13 +44,13 @@ class Frame:
     of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
     ``note``: the text that progress shows for the frame.
 
-    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm],
-    newton_iterations, cut_backs. Of the reference also, where all energy is stored, energy_gap since the last frame
-    (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoidal rule is poor); where the tangent is symmetric,
-    negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
-    max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
-    number of cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa]
-    and the contact_area at rest [mm2]; of a muscle the stresses of ``stress_statistics``, as stress_von_mises_p95 [MPa].
+    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm], newton_iterations,
+    cut_backs. Of the reference also, where all energy is stored, energy_gap since the last frame (``solvers/fenicsx/path``; of
+    muscles by Simpson's rule where the trapezoidal rule is poor); where the tangent is symmetric, negative_modes and, of those,
+    material_modes (``solvers/fenicsx/stability``); min_cell_volume_ratio and max_cell_volume_ratio, extremes of the means over
+    cells, and where a law limits the fibre stretch min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the number of
+    cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa] and the
+    contact_area at rest [mm2]; of a muscle the stresses of ``stress_statistics``, as stress_von_mises_p95 [MPa].
     """
 
     number: float
@@ -89,8 +89,8 @@ class Run:
     """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
 
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
-    [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines only moves no
-    surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
+    [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver that moves only lines has
+    no surface: ``has_surface`` is False, and all ``positions`` are NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
     name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames in memory; for a body they are the whole run.
     ``body``, ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: other muscles' runs by name.
     """

@@ -1,7 +1,8 @@
 """Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a ball on a tibialis anterior.
 
 The material is the shipped one, chosen from other sources and never fitted to these. Shapes are idealised, and their sizes are
-from memory or assumed, so that neither entry can validate. The measurements of the publications are in ``validation/experiments``.
+from memory or assumed, so that no entry validates the model. The measurements of the publications are in
+``validation/experiments``.
 """
 
 import math

@@ -292,8 +292,8 @@ def test_an_unsolved_case_says_where_and_why_and_keeps_what_it_reached(name, tmp
     assert status == cli.SOLVER_FAILED
     facts = next(iter(facts["muscles"].values())) if scene.parts else facts
     assert facts["status"] in ("diverged", "inverted")
-    assert "det F is smallest" in facts["message"]
-    assert "contact is deepest" in facts["message"]
+    assert "the smallest det F is" in facts["message"]
+    assert "the deepest contact is" in facts["message"]
     reached = [frame for frame, value in rows(facts, "volume", "deviation").items() if value is not None]
     assert reached[:2] == list(scene.frames.numbers[:2])
 

@@ -38,7 +38,7 @@ class Patches:
 class Nearby:
     """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. It keeps for each patch the clearance
     ``free`` (p,) [mm] of its points at the last search, the positions ``seen`` (p, k, 3) of its nodes then, in the bone's frame,
-    and whether a search has ``met`` it since the last settled state.
+    and whether a search has examined its points (``met``) since the last converged state.
     """
 
     def __init__(self, shape: Obstacle, reach: float, patches: Patches) -> None:
@@ -67,9 +67,9 @@ class Nearby:
     def crossing(
         self, before: Callable[[Ints], Floats], after: Callable[[Ints], Floats]
     ) -> tuple[Ints, Floats, Floats]:
-        """The points (n,) whose straight path since the settled state may have come within reach, and the ends (n, 3) of the path,
-        which ``before`` and ``after`` give for any points. A patch that was not met lies in a ball clear of the bone, and so do its
-        paths.
+        """The points (n,) whose straight path since the last converged state may have come within reach, and the ends (n, 3) of
+        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since lies in a ball clear of
+        the bone, and so do the paths of its points.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

@@ -145,8 +145,8 @@ class Worker:
         sentence = (
             f"{self.collapse or reached.last.detail} beyond frame {reached.at:.2f} "
             f"with steps down to {self.settings.smallest_step}; "
-            f"in the last good state det F is smallest, {body.determinants.smallest()}"
-            f"{f', and contact is deepest, {contact.deepest()}' if contact else ''}"
+            f"in the last good state the smallest det F is {body.determinants.smallest()}"
+            f"{f', and the deepest contact is {contact.deepest()}' if contact else ''}"
             f"{self.instability().replace('of them', 'of the frames reached')}{self.ranges}; "
             f"try a smaller motion or {other}"
         )
