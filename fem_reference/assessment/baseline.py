@@ -106,7 +106,9 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
         want = "the key of this scene (it was changed since; --update takes the current measures)"
         raise InputError(f"{path}: scene", got, want)
     if baseline.frames != case.numbers:
-        raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
+        raise InputError(
+            f"{path}: frames", f"{len(baseline.frames)} numbers, not all of the scene", "its frame numbers"
+        )
     return baseline
 
 
@@ -192,9 +194,9 @@ def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
     """The tolerance of a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
     from the error bars (f,) of a deviation.
 
-    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value: the past
-    is exact even where the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of the run
-    itself, which has no bar, the greatest value plus its tolerance.
+    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value: stored
+    values are exact, however uncertain the reference is. Distance: the greatest sum of a value and its bar; for a measure of the
+    run itself, which has no bar, the greatest value plus its tolerance.
     """
     least = 10.0 * 10.0 ** -PLACES[one.unit]
     values, bar, itself = np.abs(one.values), greatest(bars), metrics.of_itself(one.metric)

@@ -1,9 +1,9 @@
 """A Gaussian process: a function of a few uniform variables from its values in runs, and its sensitivities.
 
-It has a linear trend and a squared exponential covariance with a length scale for each variable. Lengths and noise have the
-greatest likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and 5.4.1), each with the
-optimal trend and one optimal variance of all outputs. Sobol's indices are sampled: those of a variable alone as in Saltelli et al.
-2010 (doi 10.1016/j.cpc.2009.09.018), those with others as in Jansen 1999.
+It has a linear trend and a squared exponential covariance with a length scale for each variable. The lengths and
+the noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and
+5.4.1), with the optimal trend and one optimal variance of all outputs. Sobol's indices are estimated by sampling: first-order ones
+as in Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), total ones as in Jansen 1999.
 """
 
 from dataclasses import dataclass, replace
@@ -75,7 +75,7 @@ def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
     0.997
     """
     if not (np.isfinite(points).all() and np.isfinite(outputs).all()):
-        raise ValueError("finite points and outputs: a run without a value has no place in a surrogate")
+        raise ValueError("points and outputs must be finite: leave out runs without a value")
     variance = float(outputs.var(axis=0).sum())
     if variance <= (1e-12 * np.abs(outputs).max(initial=0.0)) ** 2:
         return None

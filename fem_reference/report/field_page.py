@@ -59,7 +59,7 @@ def apart(example: Comparison) -> str:
     name = f"the {other.name}" if other.solver == "listing" else other.name
     for run, called in ((other, name), (reference, "the reference")):
         if not np.isfinite(run.vertex_values[-1]).all():
-            return f"{called} is not a number, so they cannot be compared."
+            return f"{called} has values that are not finite, so the two solutions cannot be compared."
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
@@ -72,7 +72,7 @@ def apart(example: Comparison) -> str:
     )
     return (
         f"{name} gives {number(low)} to {number(high)}, the equation {number(least)} to {number(greatest)}; "
-        f"at the furthest vertex they differ by {number(distance)}, {compared}."
+        f"their greatest difference at a vertex is {number(distance)}, {compared}."
     )
 
 

@@ -57,7 +57,7 @@ def test_interactions_count_in_total_sensitivities() -> None:
 def test_a_run_without_a_value_is_refused(bad: float) -> None:
     outputs = np.ones((8, 1))
     outputs[3] = bad
-    with pytest.raises(ValueError, match="a run without a value has no place"):
+    with pytest.raises(ValueError, match="leave out runs without a value"):
         gaussian_process.fit(sampled(1, 8, 1), outputs)
 
 

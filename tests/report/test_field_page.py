@@ -61,7 +61,7 @@ def test_a_run_that_is_not_a_number_is_reported_and_not_drawn(tmp_path, make):
     read(text)
     assert "it blew &lt;up&gt;" in text
     assert '<span class="bad">not a number</span>' in text
-    assert "the listing is not a number, so they cannot be compared" in text
+    assert "the listing has values that are not finite, so the two solutions cannot be compared" in text
     assert text.count("Its values are not a number") == (0 if make is rod else 2)
 
 
@@ -85,7 +85,7 @@ def test_the_first_sentence_says_how_far_listing_and_equation_part(tmp_path):
     # The reference falls to -2 and the listing to 3 times that: they differ by 4, twice as far as 2.
     minus = "\N{MINUS SIGN}"
     assert field_page.apart(other) == (
-        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; at the furthest vertex they differ by 4, "
+        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; their greatest difference at a vertex is 4, "
         "2 times the greatest value of the equation's solution."
     )
 

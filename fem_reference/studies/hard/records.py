@@ -118,7 +118,7 @@ class Hard(Record):
     ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
     case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
     should end with a status; ``contrast``: the defect that the case demonstrates, so that a run should exceed its bound.
-    ``by_effects``: only effects act, so that the case does not apply to solvers that simulate none. ``settings``: by solver, those
+    ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none. ``settings``: by solver, those
     that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
     """
 

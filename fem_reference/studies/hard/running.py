@@ -106,7 +106,12 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
         if hard.only and solver not in hard.only:
             return Cell(hard.name, solver, "not applicable", f"only for {', '.join(hard.only)}: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
-            return Cell(hard.name, solver, "not applicable", "only effects act, and this solver simulates none")
+            return Cell(
+                hard.name,
+                solver,
+                "not applicable",
+                "the case depends on its effects, which this solver does not simulate",
+            )
         if takes is not None and (problem := mechanical(posed.problem)) is not None:
             acting = dict.fromkeys(name_of(one) for one in effects_of(problem))
             if lacks := [name for name in acting if name not in (*LAW, *takes)]:
