@@ -131,3 +131,9 @@ def test_bodies_in_each_other_are_compared_each_with_itself() -> None:
     same = following.on_meshes(hard, lifted(hard), 2, lifted)
     assert same.same
     assert float(same.sentence.split("apart by ")[1].split(" %")[0]) < 1e-6
+
+
+def test_a_solver_of_one_body_does_not_apply_to_several() -> None:
+    """It ended in an AttributeError, which counted as a failure of the solver."""
+    with pytest.raises(InputError, match="xpbd: got a solver of a single body, want one that solves several"):
+        follow(blocks.several(CASES["neighbours.squeezed"]), records.choices()["xpbd"])
