@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.boxes import around, boxes_of, reached
+from fem_reference.geometry.boxes import around, bounds, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
@@ -70,7 +70,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     of_body, of_bone = (np.unique(side) for side in pairs.T)
 
     def into_bone(points: Floats) -> Floats:
-        return np.maximum(-shape.sample(points).distance, 0.0)
+        return np.maximum(-shape.distances(points), 0.0) if len(points) else np.zeros(0)
 
     def into_body(points: Floats) -> Floats:
         return depths_within(local, points, of_body)
@@ -114,7 +114,7 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def _in_box(body: Surface, points: Floats) -> Ints:
     """The indices (k,) of the ``points`` (n, 3) within the bounding box of a ``body``."""
-    low, high = body.points.min(axis=0), body.points.max(axis=0)
+    low, high = bounds(body) if len(points) else (points, points)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
 
 
