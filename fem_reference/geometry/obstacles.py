@@ -1,6 +1,7 @@
 """Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their two derivatives."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -51,6 +52,17 @@ class Quadric:
         """The second derivative (n,) along ``directions`` (n, 3), the same everywhere."""
         own = directions @ self.pose[:3, :3] / self.radii
         return np.asarray(2 * np.vecdot(own, own))
+
+    def curving(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
+        slope = (points - self.pose[:3, 3]) @ self._form
+        return np.asarray((-np.vecdot(directions @ self._form, directions) / np.vecdot(slope, slope))[:, None] * slope)
+
+    @cached_property
+    def _form(self) -> Floats:
+        """The matrix (3, 3) of half of the second derivatives."""
+        turn = self.pose[:3, :3] / self.radii
+        return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside first off the axis."""
@@ -107,6 +119,11 @@ class Ring:
         out, up = np.vecdot(directions, outward), directions @ axis
         around = np.vecdot(directions, directions) - out**2 - up**2
         return np.asarray(2 * (out**2 + up**2 + around * (1 - self.radius / away)))
+
+    def curving(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
+        slope = self.level(points)[1]
+        return np.asarray((-self.bending(points, directions) / np.vecdot(slope, slope))[:, None] * slope)
 
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface, away from the circle."""
