@@ -12,7 +12,7 @@ RATE = 60.0  # the requested rate [frames a second]
 
 @dataclass(frozen=True)
 class Answer:
-    """The ``best`` setting of all for a request, None where none meets it, and the best ``by_solver``; the ``limits`` of error and
+    """The ``best`` setting of all for a request, None if none meets it, and the best ``by_solver``; the ``limits`` of error and
     time [s], empty for the knee. ``nearest``: the setting that misses the limits least, where none meets them.
     """
 

@@ -31,7 +31,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why these runs are too few for a band, empty where they are not."""
+        """The reason why these runs are too few for a band, empty if they are not."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have answers, and {2 * (variables + 1)} are the fewest for {variables} parameters"
@@ -116,6 +116,6 @@ def _samples(design: Design) -> Floats:
 
 
 def _not_numbers(values: Floats) -> str:
-    """The reason to refuse values that are not all numbers, empty where they are."""
+    """The reason to refuse values that are not all numbers, empty if they are."""
     bad = int((~np.isfinite(values)).sum())
     return f"{bad} values of runs are not numbers" if bad else ""

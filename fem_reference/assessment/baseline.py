@@ -56,7 +56,7 @@ class StoredStatistic(Record):
 
     @property
     def numbers(self) -> Floats:
-        """The values (f,), NaN where there is none."""
+        """The values (f,), NaN if there is none."""
         return np.array(self.values, float)
 
 
@@ -68,7 +68,7 @@ class Positions(Record):
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
 
     def points(self, count: int, place: str) -> Floats:
-        """The values, NaN where there is none; InputError at ``place`` where a vertex number is not below ``count``."""
+        """The values, NaN if there is none; InputError at ``place`` where a vertex number is not below ``count``."""
         if max(self.vertices) >= count:
             raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
         return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
@@ -92,13 +92,13 @@ class Baseline(Record):
 
 
 def check(path: Path, case: MuscleCase, candidate: str) -> None:
-    """Raise InputError where an update of ``path`` would overwrite a damaged file, or one of another case or candidate."""
+    """Raise InputError if an update of ``path`` would overwrite a damaged file, or one of another case or candidate."""
     if path.exists():
         _check_whose(path, _read(path), case, candidate)
 
 
 def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
-    """The baseline in ``path``; InputError where it is missing, damaged, or of another case, scene or candidate."""
+    """The baseline in ``path``; InputError if it is missing, damaged, or of another case, scene or candidate."""
     baseline = _read(path)
     _check_whose(path, baseline, case, candidate)
     if baseline.scene != case.key:
@@ -174,7 +174,7 @@ def _check_shape(place: str, baseline: Baseline) -> None:
 
 
 def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: str) -> None:
-    """Raise InputError where a baseline belongs to another case or candidate."""
+    """Raise InputError if a baseline belongs to another case or candidate."""
     for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')

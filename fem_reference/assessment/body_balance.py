@@ -38,7 +38,7 @@ def _sum(vectors: dict[str, Floats]) -> Floats:
 
 
 def _counted_once(body: Body, state: Frame) -> bool:
-    """True where a ``state`` has every force on a ``body``, and none twice."""
+    """True if a ``state`` has every force on a ``body``, and none twice."""
     others = {bone.name for bone in body.bones} | {name for law in body.touching for name in law.forces}
     names = {entry.name for entry in body.prescribed}
     if names & others or not names <= set(state.forces) or set(state.forces) != set(state.moments):
@@ -49,7 +49,7 @@ def _counted_once(body: Body, state: Frame) -> bool:
 
 
 def _load(body: Body, frame: float) -> Floats | None:
-    """The force (3,) [N] of external loads at a frame; None where it is not known from the shape at rest."""
+    """The force (3,) [N] of external loads at a frame; None if it is not known from the shape at rest."""
     if not all(type(one).__module__.startswith("fem_reference.effects.") for one in body.effects):
         return None
     acting, mesh = [one for one in body.effects if one.outer], body.mesh

@@ -64,7 +64,7 @@ class Estimate:
 
     @property
     def is_known(self) -> bool:
-        """True where the interval is narrower than the range that was allowed."""
+        """True if the interval is narrower than the range that was allowed."""
         return self.high - self.low < self.parameter.high - self.parameter.low
 
 
@@ -91,17 +91,17 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True where the law fits the data to within their scatter."""
+        """True if the law fits the data to within their scatter."""
         return self.scatter <= FOLLOWED
 
     @property
     def holds(self) -> bool:
-        """True where the fit has converged, the law fits the data, and all estimates are known within their ranges."""
+        """True if the fit has converged, the law fits the data, and all estimates are known within their ranges."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
 def read(path: Path, units: Callable[[str, str], str]) -> tuple[Measurement, ...]:
-    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError where there is none."""
+    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError if there is none."""
     head, *lines = files.read_rows(path) or [[]]
     if tuple(one.strip() for one in head) != COLUMNS:
         raise InputError(path, f'the first row "{",".join(head)}"', _WANT)
@@ -140,7 +140,7 @@ class _Residuals:
         self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
 
     def at(self, points: Sequence[Floats]) -> list[Floats]:
-        """The residuals (m,) at each point, infinite where it has no answer."""
+        """The residuals (m,) at each point, infinite if it has no answer."""
         asked = [point for point in points if point.tobytes() not in self.known]
         for point, found in zip(asked, self.forward(asked), strict=True):
             lost = np.full(len(self.values), np.inf)

@@ -163,7 +163,7 @@ def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_cont
 
 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
-    """The order at which the error falls over the last two meshes of a ``ladder`` of (size, value), None where one is exact.
+    """The order at which the error falls over the last two meshes of a ``ladder`` of (size, value), None if one is exact.
 
     >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
     2.0
@@ -195,7 +195,7 @@ class Verification:
 
     @property
     def passed(self) -> str:
-        """The number of judged results that pass, in words; empty where there are none."""
+        """The number of judged results that pass, in words; empty if there are none."""
         failed = sum(one in self.failed for one in self.judged)
         return f"{len(self.judged) - failed} of {len(self.judged)} pass" if self.judged else ""
 

@@ -39,7 +39,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """The cover of ``claims``; NaN where there are none."""
+        """The cover of ``claims``; NaN if there are none."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)

@@ -36,7 +36,7 @@ class Convergence:
     """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
 
     ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices to the finest
-    solution of order 2. ``order`` is NaN where the errors are rounding.
+    solution of order 2. ``order`` is NaN if the errors are rounding.
     """
 
     element: str
@@ -51,7 +51,7 @@ class Comparison:
     """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
     reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has
     none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the extension on
-    the reference's own surface, None where there is none. ``error_bars``: those of the reference, None if not computed;
+    the reference's own surface, None if there is none. ``error_bars``: those of the reference, None if not computed;
     ``ladders``: its convergence, where measured.
     """
 
@@ -74,7 +74,7 @@ class Comparison:
 
     def __getitem__(self, key: tuple[str, str, str]) -> Measure:
         """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; for
-        ``"reference"`` its change from rest. KeyError where there is none.
+        ``"reference"`` its change from rest. KeyError if there is none.
         """
         name, metric, statistic = key
         measures = self.changes["reference"] if name == "reference" else self.deviations.get(name, ())
@@ -132,8 +132,8 @@ def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
-    ``candidates`` have all frames of the case, NaN where one was not reached; a measure that ``error_bars`` leave in doubt is
-    inconclusive. InputError where the case expects a measure of a named run that lacks it because it has no surface.
+    ``candidates`` have all frames of the case, NaN if one was not reached; a measure that ``error_bars`` leave in doubt is
+    inconclusive. InputError if the case expects a measure of a named run that lacks it because it has no surface.
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
@@ -179,7 +179,7 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """True where the expected measure is among ``measures``; a run without a surface lacks many."""
+    """True if the expected measure is among ``measures``; a run without a surface lacks many."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 

@@ -133,7 +133,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """Raise InputError where a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
+    """Raise InputError if a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

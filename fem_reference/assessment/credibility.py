@@ -54,7 +54,7 @@ def claims() -> tuple[Evidence, ...]:
 @dataclass(frozen=True)
 class Beside:
     """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, from ``n``
-    specimens, None where unknown; ``validates``: True if agreement counts as validation; ``rests_on``: the text in which the
+    specimens, None if unknown; ``validates``: True if agreement counts as validation; ``rests_on``: the text in which the
     truth was read, and the unmeasured parts of truth or model; ``kind``: measurement, or model where another model is the truth;
     ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
@@ -133,7 +133,7 @@ class Row:
 
 
 def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
-    """The ``entries`` of the catalogue that verify a ``claim``; LookupError where one of its groups does not exist."""
+    """The ``entries`` of the catalogue that verify a ``claim``; LookupError if one of its groups does not exist."""
     behind = [one for one in entries if one.group in claim.verified]
     if missing := set(claim.verified) - {one.group for one in behind}:
         raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
@@ -143,7 +143,7 @@ def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
 def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
     """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
 
-    KeyError where an experiment was not measured, LookupError where a group of the catalogue does not exist.
+    KeyError if an experiment was not measured, LookupError if a group of the catalogue does not exist.
     """
     behind = verifying(claim, entries)
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
@@ -209,7 +209,7 @@ def reached(arms: ArmsBeside) -> float:
 @dataclass(frozen=True)
 class Fitted:
     """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
-    None where none is known, and the ``values`` of all quantities by name; ``converged``: True where the fit ended at a least sum
+    None if none is known, and the ``values`` of all quantities by name; ``converged``: True where the fit ended at a least sum
     of squares, False where its ``evaluations`` ran out before.
     """
 
@@ -222,7 +222,7 @@ class Fitted:
 
     @property
     def inside(self) -> bool | None:
-        """True where every parameter with a published range is inside it; None where none has one."""
+        """True if every parameter with a published range is inside it; None if none has one."""
         known = [low <= value <= high for value, found in self.parameters.values() if found for low, high in [found]]
         return all(known) if known else None
 

@@ -87,7 +87,7 @@ class ErrorBars:
     bars: tuple[ErrorBar, ...]
 
     def find(self, of: Of, metric: str, statistic: str) -> ErrorBar | None:
-        """The bar of a statistic, ``of`` a change or a deviation; None where there is none."""
+        """The bar of a statistic, ``of`` a change or a deviation; None if there is none."""
         wanted = (of, metric, statistic)
         return next((bar for bar in self.bars if (bar.of, bar.metric, bar.statistic) == wanted), None)
 
@@ -222,7 +222,7 @@ def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
-    """The bars stored in ``folder``; None where there are none that match ``of``, InputError where the file is damaged."""
+    """The bars stored in ``folder``; None if there are none that match ``of``, InputError if the file is damaged."""
     place = folder / FILE
     if not place.exists():
         return None
@@ -243,7 +243,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 class BodyBars:
     """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
-    [N mm]; NaN where unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
+    [N mm]; NaN if unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
     nodes; ``sharper`` describes the more accurate solution.
     """
 
@@ -280,7 +280,7 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
 
 
 def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
-    """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
+    """The ``other`` state at the points of ``state``, NaN if it has none or was not reached."""
     if other is None:
         lost = np.full(3, np.nan)
         blank: dict[str, Any] = {kind: dict.fromkeys(getattr(state, kind), lost) for kind in ("forces", "moments")}

@@ -78,7 +78,7 @@ class RodError:
 @dataclass(frozen=True)
 class AnswerChange:
     """The change of the reference's answer with fibres of a ``source`` in place of those of ``against``: by ``metric.statistic``
-    the greatest over the frames, empty where a solution is missing (``status``); ``bars``: the error bars of the answer.
+    the greatest over the frames, empty if a solution is missing (``status``); ``bars``: the error bars of the answer.
     """
 
     case: str

@@ -40,7 +40,7 @@ class Fact(Record):
 
     @property
     def validates(self) -> bool:
-        """True where it was read in the publication or its abstract and has a deviation over several specimens."""
+        """True if it was read in the publication or its abstract and has a deviation over several specimens."""
         read = self.read_in in ("publication", "abstract") and self.how not in ("fit", "memory")
         return read and self.sd is not None and (self.n or 0) > 1
 
@@ -107,13 +107,13 @@ def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two facts, and its standard deviation as if they were independent; NaN where one has none."""
+    """The ratio of two facts, and its standard deviation as if they were independent; NaN if one has none."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)
 
 
 def least_specimens(several: Iterable[Fact]) -> int | None:
-    """The least number of specimens of ``several`` facts; None where one is unknown."""
+    """The least number of specimens of ``several`` facts; None if one is unknown."""
     counts = [one.n for one in several]
     return None if None in counts or not counts else min(one for one in counts if one is not None)

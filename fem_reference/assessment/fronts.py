@@ -57,7 +57,7 @@ class Point:
 
     @property
     def is_default(self) -> bool:
-        """True where nothing was varied."""
+        """True if nothing was varied."""
         return not self.knob
 
     @property
@@ -73,16 +73,16 @@ class Point:
 
     @property
     def load(self) -> float:
-        """The share of the machine that other processes kept busy during its run; NaN where that is not known."""
+        """The share of the machine that other processes kept busy during its run; NaN if that is not known."""
         return self.costs.get(LOAD, math.nan)
 
     @property
     def is_loaded(self) -> bool:
-        """True where its time was measured on a machine that was busy with other work."""
+        """True if its time was measured on a machine that was busy with other work."""
         return self.load > LOADED
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
-        """Its error and its cost, None where one is not known or not above zero."""
+        """Its error and its cost, None if one is not known or not above zero."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
         return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
 
@@ -114,12 +114,12 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True where the front spans half the error, so that its factor is no extrapolation."""
+        """True if the front spans half the error, so that its factor is no extrapolation."""
         return self.worst >= 2 * self.best
 
 
 def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where it is unknown."""
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None if it is unknown."""
     front = pareto((point for point in points if point.solver == solver), error, cost)
     pairs = [pair for point in front if (pair := point.at(error, cost))]
     if not pairs:

@@ -68,7 +68,7 @@ class GaussianProcess:
 
 
 def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
-    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None where the outputs do not vary.
+    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None if the outputs do not vary.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
     >>> float(fit(points, np.sin(3 * points))(np.array([[0.5]]))[0, 0].round(3))

@@ -70,7 +70,7 @@ class Followed:
 
 _LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
 
-# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None where there is no particular place.
+# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None if there is no particular place.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 
@@ -222,7 +222,7 @@ QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one 
 
 
 def unstable(run: Followed) -> str:
-    """The frames in which a run is an unstable equilibrium, in words; empty where there are none or modes were not counted."""
+    """The frames in which a run is an unstable equilibrium, in words; empty if there are none or modes were not counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()

@@ -36,7 +36,7 @@ _LOW = 0.1  # det F below which a state is hardly valid
 @dataclass(frozen=True)
 class Verdict:
     """The verdict on an expectation: the ``word``, the decisive ``value`` in ``unit`` at ``frame``, and the ``error_bar`` of the
-    reference in that frame, NaN where it is unknown and None where there are no bars.
+    reference in that frame, NaN if it is unknown and None if there are no bars.
     """
 
     word: Word
@@ -162,6 +162,6 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
 
 
 def in_unit(given: str | float, unit: str) -> float:
-    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError where the dimension differs."""
+    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError if the dimension differs."""
     kind, factor = _KINDS[unit]
     return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None where unknown."""
+    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None if unknown."""
 
     scene: MuscleCase
     candidate: Run
@@ -56,13 +56,13 @@ class CurrentMeasures:
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 
     def values(self, name: str) -> Floats:
-        """The values (f,) of a ``metric.statistic``, NaN where not finite or not measured for this candidate."""
+        """The values (f,) of a ``metric.statistic``, NaN if not finite or not measured for this candidate."""
         found = metrics.find(self.measures, *name.split("."))
         values = np.full(len(self.reference.numbers), np.nan) if found is None else found.values
         return np.where(np.isfinite(values), values, np.nan)
 
     def bars(self, name: str) -> Floats:
-        """The error bars (f,) of a deviation by ``metric.statistic``, NaN where unknown; a statistic of the run itself is exact."""
+        """The error bars (f,) of a deviation by ``metric.statistic``, NaN if unknown; a statistic of the run itself is exact."""
         metric, statistic = name.split(".")
         if metrics.of_itself(metric):
             return np.zeros(len(self.reference.numbers))

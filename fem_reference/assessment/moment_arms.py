@@ -24,7 +24,7 @@ class ArmRange:
     high: Floats
 
     def at(self, angles: Floats) -> "ArmRange":
-        """The range at other ``angles`` (b,) [deg], linear in between; NaN where it does not reach."""
+        """The range at other ``angles`` (b,) [deg], linear in between; NaN if it does not reach."""
         within = (angles >= self.angles.min()) & (angles <= self.angles.max())
         low, high = (np.interp(angles, self.angles, side) for side in (self.low, self.high))
         return ArmRange(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
@@ -38,7 +38,7 @@ def poses(angles: Floats) -> Floats:
 
 def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
     """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the polynomial of fourth degree that fits the ``lengths`` (f, k)
-    [mm] of k fibres at ``angles`` (f,) [deg] best. InputError where too few angles differ.
+    [mm] of k fibres at ``angles`` (f,) [deg] best. InputError if too few angles differ.
     """
     if len(np.unique(np.round(angles, 9))) <= DEGREE:
         raise InputError("angles", f"{len(np.unique(angles))} of them", f"more than {DEGREE} that differ")
@@ -63,7 +63,7 @@ def share_inside(curve: Floats, found: ArmRange) -> float:
 
 
 def overlap(found: ArmRange, published: ArmRange) -> float:
-    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN where no pose is known."""
+    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN if no pose is known."""
     known = np.isfinite(published.low) & np.isfinite(published.high)
     if not known.any():
         return float("nan")
@@ -95,7 +95,7 @@ class ArmsBeside:
 
     @property
     def is_curve(self) -> bool:
-        """True where one curve was published, not a range."""
+        """True if one curve was published, not a range."""
         return bool(np.array_equal(self.published.low, self.published.high, equal_nan=True))
 
     @property

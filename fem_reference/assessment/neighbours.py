@@ -47,7 +47,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN where one has
+    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN if one has
     no surface.
     """
     for one, other in combinations(runs, 2):

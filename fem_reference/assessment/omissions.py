@@ -39,11 +39,11 @@ class Omission:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s], for the reference that of solving without compilation; NaN where unknown."""
+        """Processor time [s], for the reference that of solving without compilation; NaN if unknown."""
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where unknown."""
+        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN if unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
@@ -59,11 +59,11 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] over that of the complete run, NaN where one is unknown."""
+        """A time [s] over that of the complete run, NaN if one is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` over that of the complete run, NaN where one is unknown."""
+        """One of ``COUNTS`` over that of the complete run, NaN if one is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 
@@ -83,7 +83,7 @@ class CaseOmissions:
 
 
 def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str, float]:
-    """Each of ``changes`` in error bars: NaN where the bar is unknown.
+    """Each of ``changes`` in error bars: NaN if the bar is unknown.
 
     >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
     {'volume.deviation': 2.0, 'surface_deviation.rms': nan}

@@ -10,7 +10,7 @@ from fem_reference.metrics import Measure, described, find
 
 @dataclass(frozen=True)
 class Deviation:
-    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` there, NaN where unknown."""
+    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` there, NaN if unknown."""
 
     name: str
     value: float
@@ -66,7 +66,7 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
 
 
 def _less(one: Deviation, other: Deviation) -> bool:
-    """True where ``one`` is certainly nearer to the truth than ``other``."""
+    """True if ``one`` is certainly nearer to the truth than ``other``."""
     if math.isnan(other.value):
         return not math.isnan(one.value)
     return one.value + one.bar < other.value - other.bar

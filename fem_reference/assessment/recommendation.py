@@ -48,7 +48,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Margins:
-    """Factors on errors and times relative to the most similar cases; 1 where measured on the case."""
+    """Factors on errors and times relative to the most similar cases; 1 if measured on the case."""
 
     error: float = 1.0
     time: float = 1.0
@@ -127,7 +127,7 @@ def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], met
 
 
 def _is_same(one: Features, other: Features) -> bool:
-    """True where a case has the same features as when it was studied."""
+    """True if a case has the same features as when it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
@@ -225,7 +225,7 @@ def setting(point: Point, study: CaseStudy) -> str:
 
 
 def is_elsewhere(point: Point) -> bool:
-    """True where a setting can be used on another case: only mesh keys of a scene are transferable."""
+    """True if a setting can be used on another case: only mesh keys of a scene are transferable."""
     return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
 
 
@@ -244,7 +244,7 @@ def _settings(point: Point) -> str:
 @dataclass(frozen=True)
 class Transfer:
     """Settings of a ``solver`` chosen on all cases but one (``left_out``) and applied to that: their ``error`` there, the
-    ``best`` error of any of the same settings there, and that of the ``default`` (NaN where there is none).
+    ``best`` error of any of the same settings there, and that of the ``default`` (NaN if there is none).
     """
 
     solver: str

@@ -23,8 +23,8 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 class Judgement:
     """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and of the decisive frame.
 
-    ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` is its greatest distance from its earlier value
-    (``unchanged``) or from the reference (``within``), NaN where unknown; ``known`` is the error bar of that comparison value.
+    ``was`` and ``current`` are its values, NaN if there is none; ``allowed`` is its greatest distance from its earlier value
+    (``unchanged``) or from the reference (``within``), NaN if unknown; ``known`` is the error bar of that comparison value.
     """
 
     question: Question

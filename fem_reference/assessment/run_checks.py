@@ -55,7 +55,7 @@ class RunCheck:
 
     @property
     def met(self) -> bool:
-        """True where the value is allowed; never for a value that is not a number."""
+        """True if the value is allowed; never for a value that is not a number."""
         return self.value <= self.allowed
 
     @property

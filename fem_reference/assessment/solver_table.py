@@ -60,8 +60,8 @@ def _file() -> _File:
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
     against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
-    parameters that a user must give, by kind; empty where that is not known. ``unsound``: the reason why its frames are no
-    answer, empty where they are one.
+    parameters that a user must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are no
+    answer, empty if they are one.
     """
 
     kind: str
@@ -78,7 +78,7 @@ class SolverResult:
     unsound: str = ""
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
-        """The value of greatest magnitude over the frames and its frame; NaN where any frame is NaN, None without the measure."""
+        """The value of greatest magnitude over the frames and its frame; NaN if any frame is NaN, None without the measure."""
         found = find(self.measures, metric, statistic)
         return None if found is None else (found.worst.value, self.numbers[found.worst.index])
 
@@ -131,12 +131,12 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene with most of them; empty where that is not known."""
+        """The parameters that ``name`` needs on the scene with most of them; empty if that is not known."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
-        """The worst frames of ``name`` over all scenarios; None where it was not measured."""
+        """The worst frames of ``name`` over all scenarios; None if it was not measured."""
         mine = self._by(kind, name)
         found = [(value[0], one.case) for one in mine if (value := one.worst(metric, statistic)) is not None]
         finite = [(value, case) for value, case in found if not np.isnan(value)]

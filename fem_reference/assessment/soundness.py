@@ -18,7 +18,7 @@ _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are no answer, with its frame; empty where they are an answer, and for a run
+    """The first reason why the frames of a ``run`` are no answer, with its frame; empty if they are an answer, and for a run
     without the reference's surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
@@ -33,7 +33,7 @@ def unsound(run: Run, reference: Run) -> str:
 
 
 def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
-    """The reason at a frame, from positions (n, 3) [mm]; empty where there is none."""
+    """The reason at a frame, from positions (n, 3) [mm]; empty if there is none."""
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:

@@ -52,7 +52,7 @@ class Standing(Record):
 
     @property
     def failed(self) -> bool:
-        """True where the row is not to be ranked."""
+        """True if the row is not to be ranked."""
         return self.status != "converged" or bool(self.unsound)
 
     @property
@@ -62,7 +62,7 @@ class Standing(Record):
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
     def is_of(self, truth: str, run: str) -> bool:
-        """True where the row was measured by this protocol, on runs with these keys."""
+        """True if the row was measured by this protocol, on runs with these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
@@ -70,7 +70,7 @@ class Standing(Record):
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
-        """True where the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
+        """True if the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
 
 
@@ -134,7 +134,7 @@ def _error(row: Standing, name: str) -> float:
 
 
 def load(path: Path) -> tuple[Standing, ...]:
-    """The rows of standings that were written to ``path``; none where there is no file. InputError where it is another file."""
+    """The rows of standings that were written to ``path``; none where there is no file. InputError if it is another file."""
     if not path.exists():
         return ()
     found = texts.read_json(path, "standings as the verb standings writes them")

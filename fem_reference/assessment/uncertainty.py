@@ -30,7 +30,7 @@ class Parameter:
 
     @property
     def contains(self) -> bool:
-        """True where the case's own value is within the range."""
+        """True if the case's own value is within the range."""
         return self.low <= self.nominal <= self.high
 
     def value(self, place: float) -> float:
@@ -67,12 +67,12 @@ class Failure:
 @dataclass(frozen=True, eq=False)
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
-    ``high`` (f,) beside the case's own answer ``nominal``; NaN where the quantity is not defined. ``bar`` (f,): the numerical error
-    bar of that answer, None where it has none. ``distance``: True for a distance from that answer; less is then always inside.
+    ``high`` (f,) beside the case's own answer ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
+    bar of that answer, None if it has none. ``distance``: True for a distance from that answer; less is then always inside.
 
-    ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN where there is none.
+    ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN if there is none.
     ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, empty
-    where there is one. ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty where the
+    where there is one. ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty if the
     surrogate is not accurate enough (``unreliable``).
     """
 
@@ -101,14 +101,14 @@ class Band:
 
     @property
     def greatest_bar(self) -> float:
-        """The greatest error bar over the frames, NaN where there is none."""
+        """The greatest error bar over the frames, NaN if there is none."""
         known = self.bar is not None and np.isfinite(self.bar).any()
         return float(np.nanmax(self.bar)) if known else math.nan  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate beside a band: its ``values`` (f,), and by frame its ``places``, empty where there is no band or no value is
+    """A candidate beside a band: its ``values`` (f,), and by frame its ``places``, empty if there is no band or no value is
     expected.
     """
 
@@ -120,13 +120,13 @@ class Placed:
 
     @property
     def word(self) -> str:
-        """The worst place over the frames; empty where there is none."""
+        """The worst place over the frames; empty if there is none."""
         found = set(self.places)
         return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 
     @property
     def share(self) -> float:
-        """The share of the frames in which it is inside; NaN where no frame counts."""
+        """The share of the frames in which it is inside; NaN if no frame counts."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 

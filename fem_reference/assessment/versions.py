@@ -21,7 +21,7 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 @dataclass(frozen=True, eq=False)
 class Change:
     """The distances of a statistic from the reference, earlier (``was``) and ``now`` (f,), in ``unit``, at frame ``numbers``;
-    ``bars`` (f,): the error bars of the reference, NaN where unknown.
+    ``bars`` (f,): the error bars of the reference, NaN if unknown.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Change:
 
     @property
     def in_bars(self) -> float:
-        """The change in that frame in error bars, NaN where these are unknown."""
+        """The change in that frame in error bars, NaN if these are unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
@@ -106,7 +106,7 @@ class Change:
 @dataclass(frozen=True, eq=False)
 class Versions:
     """``current`` against an earlier state, ``was`` in words: ``changes``, the worst first; the distance ``moved`` (f, k) [mm] of
-    each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None where only some vertices are known.
+    each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None if only some vertices are known.
     """
 
     current: CurrentMeasures

@@ -62,7 +62,7 @@ def unshifted(case: MuscleCase) -> MuscleCase:
 
 
 def tendon_of(case: MuscleCase, i: int) -> Floats | None:
-    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None where it has none."""
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None if it has none."""
     if (tendon := case.attachment[i].tendon) is None:
         return None
     key = f"attachment[{i}].tendon"
@@ -104,7 +104,7 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
 
 
 def _is_header(cell: str) -> bool:
-    """True where the first cell of a list is a word: it has a letter and does not begin like a number (``1e5``)."""
+    """True if the first cell of a list is a word: it has a letter and does not begin like a number (``1e5``)."""
     return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
 
 
@@ -255,7 +255,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    """The fibres in the files of a case, or those between the surface fibres in its files; None where it has neither."""
+    """The fibres in the files of a case, or those between the surface fibres in its files; None if it has neither."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
     if (asked := case.fibres.chmd) is not None and asked.heads is not None:

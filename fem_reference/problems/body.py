@@ -96,7 +96,7 @@ def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:
-    """Raise an InputError where quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
+    """Raise an InputError if quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
     if degree == 1 and is_stabilised(element):
         raise InputError(place, degree, f"2 or more for {element}, whose pressure is stabilised")
 
@@ -141,7 +141,7 @@ class Prescribed:
     """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
     reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
     points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: that of springs over the
-    area, which pull towards the path; None where the displacement is exact. A skin has springs only. ``anchor`` [mm]: the rest
+    area, which pull towards the path; None if the displacement is exact. A skin has springs only. ``anchor`` [mm]: the rest
     place of a point on the path, to which all springs of a skin go as straight tendons: each pulls along its line while the line is
     longer than at rest.
     """
@@ -154,7 +154,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it gives none."""
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError if it gives none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -188,7 +188,7 @@ class ByCell:
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
     ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
-    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``,
+    frame numbers, None if nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``,
     where the body does not start at rest; ``regions``: by name, those in which effects act. Those of one of several pieces lie
     ``within`` a range of cells, the first and the one after the last.
     """
@@ -228,17 +228,17 @@ class Body:
 
     @property
     def rubs(self) -> bool:
-        """True where there is friction, so that a state depends on the path to it."""
+        """True if there is friction, so that a state depends on the path to it."""
         return any(one is not None for one in self.frictions)
 
     @property
     def remembers(self) -> bool:
-        """True where contact depends on earlier states: where there is friction, or a part of the surface touches itself."""
+        """True if contact depends on earlier states: where there is friction, or a part of the surface touches itself."""
         return self.rubs or any(law.one == law.other for law in self.touching)
 
     @property
     def frictions(self) -> list[float | None]:
-        """The coefficients of friction of contact and of each pair of touching parts, None where it has none."""
+        """The coefficients of friction of contact and of each pair of touching parts, None if it has none."""
         own = [self.contact.friction] if self.contact else []
         return [*own, *(law.friction for law in self.touching)]
 

@@ -62,7 +62,7 @@ class ContactLaw:
     parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
@@ -109,7 +109,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
 
 
 def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
-    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError where a point is in its middle."""
+    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError if a point is in its middle."""
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
@@ -128,7 +128,7 @@ def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, a
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:
-    """Raise InputError where most of the unattached surface is exempt from contact; log a warning where much of it is."""
+    """Raise InputError if most of the unattached surface is exempt from contact; log a warning where much of it is."""
     got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")

@@ -46,7 +46,7 @@ def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: F
 
     Fibres lie in the plane of x and y. Where they are at an angle to the load, the cube is sheared (lines along y lean towards x)
     until no shear stress acts: it is in tension or compression along x alone, like material far from the plates of a testing
-    machine, which would prevent the shear. ArithmeticError where no such state is found.
+    machine, which would prevent the shear. ArithmeticError if no such state is found.
     """
     if not all(one is FREE or 0 < one < np.inf for one in stretches):
         raise InputError("stretches", stretches, "numbers above zero, or FREE")

@@ -49,7 +49,7 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 @dataclass(frozen=True)
 class Decision:
     """Decision on whether an effect is ``needed``, by its ``indicator`` (None for a part of the material) and the allowed values
-    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where the estimates
+    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None if the estimates
     did; ``listed``: the effect acts in any case. ``of``: the one of several muscles in which it acts.
     """
 

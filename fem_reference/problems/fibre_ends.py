@@ -37,7 +37,7 @@ class FibreEnds:
 
     @cached_property
     def tendons(self) -> Floats:
-        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN where they do not."""
+        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN if they do not."""
         points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
         return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
 

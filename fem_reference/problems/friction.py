@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats
 
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
-    """Raise InputError where a coefficient of friction is neither None nor above 0, or where a body with friction has ``begun``
+    """Raise InputError if a coefficient of friction is neither None nor above 0, or where a body with friction has ``begun``
     deformed or under tension: the places to which its points stick are not known.
     """
     for one in (one for one in coefficients if one is not None):

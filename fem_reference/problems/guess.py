@@ -90,7 +90,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """The effect of the bones' motion on the muscle, in a sentence; empty where the muscle is not attached twice."""
+    """The effect of the bones' motion on the muscle, in a sentence; empty if the muscle is not attached twice."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""

@@ -57,7 +57,7 @@ class DirectionsByPiece:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """The share of points in a ``region``, or outside of it; 1 where no region is named."""
+    """The share of points in a ``region``, or outside of it; 1 if no region is named."""
 
     region: Region | None = None
     outside: bool = False
@@ -71,7 +71,7 @@ class Share:
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
     """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the whole. Effects that all bodies have
-    act everywhere, other effects act in the cells of their bodies. InputError where bodies differ in what must be the same.
+    act everywhere, other effects act in the cells of their bodies. InputError if bodies differ in what must be the same.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -141,7 +141,7 @@ def _acting(
 
 
 def _check_pressure(bodies: Mapping[str, Body]) -> None:
-    """Raise InputError where one body has an unknown, such as the pressure, that another lacks."""
+    """Raise InputError if one body has an unknown, such as the pressure, that another lacks."""
     brought = {name: {one for effect in body.effects for one in effect.unknowns} for name, body in bodies.items()}
     if len({frozenset(one) for one in brought.values()}) > 1:
         got = "; ".join(f"{name}: {', '.join(sorted(one)) or 'none'}" for name, one in brought.items())
@@ -162,7 +162,7 @@ def _moved(skin: Skin, first: int) -> Skin:
 
 
 def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> ContactLaw | None:
-    """The contact of all bodies with bones, on the points of all; None where there is none."""
+    """The contact of all bodies with bones, on the points of all; None if there is none."""
     laws: dict[str, Any] = {name: one.contact for name, one in bodies.items() if one.contact is not None}
     if not laws:
         return None

@@ -12,7 +12,7 @@ from fem_reference.problems.muscle import MuscleProblem
 def external_load(
     problem: MuscleProblem, frame: float, by: Floats | None = None, velocity: Floats | None = None
 ) -> Wrench | None:
-    """The sum of the external loads at a frame, from the displacement and velocity of nodes as in ``Displaced``; None where these
+    """The sum of the external loads at a frame, from the displacement and velocity of nodes as in ``Displaced``; None if these
     alone do not determine it. Its moment is NaN without displacements.
     """
     shape = Displaced(replace(problem.mesh, facets=problem.body.mesh.facets), by, velocity)

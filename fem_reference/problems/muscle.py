@@ -64,7 +64,7 @@ RELAXING = 10  # an overlap at rest is removed over this many frame numbers befo
 
 
 def kept_meshes() -> Path | None:
-    """The folder of stored tetrahedra, which may be deleted; None where they are made each time."""
+    """The folder of stored tetrahedra, which may be deleted; None if they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
@@ -104,7 +104,7 @@ class MuscleProblem(Setup):
     @cached_property
     def body(self) -> Body:
         """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by
-        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where
+        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError if
         two bones prescribe different motions, or one moves in a way that cannot be followed.
         """
         mesh, first = self.mesh, self.frames[0]
@@ -129,7 +129,7 @@ class MuscleProblem(Setup):
 
     @property
     def contact(self) -> ContactEffect | None:
-        """The effect of contact, None where there is none."""
+        """The effect of contact, None if there is none."""
         return among(self.effects)
 
     @property
@@ -196,7 +196,7 @@ def assembled(
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """Spacing and errors [mm] of bones' distance grids; InputError where bones and surface do not allow contact."""
+    """Spacing and errors [mm] of bones' distance grids; InputError if bones and surface do not allow contact."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name):
             place = join(case.place, f"bone[{i}]")
@@ -256,7 +256,7 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The obstacle of a ``bone`` with a closed form; None where the bone is a surface in a file."""
+    """The obstacle of a ``bone`` with a closed form; None if the bone is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 

@@ -141,7 +141,7 @@ class MusclesProblem:
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
-        """True where the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
+        """True if the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
         assert self.law is not None  # called with contact only
         skins = [skin_of(self.problems[name].mesh) for name in (one, other)]
         return _apart(*skins) < self.law.smoothing
@@ -225,7 +225,7 @@ def clearance(one: Setup, other: Setup) -> float:
 
 
 def _apart(one: Surface, other: Surface) -> float:
-    """The distance [mm] between two surfaces, from the vertices of each; 0 where they cross."""
+    """The distance [mm] between two surfaces, from the vertices of each; 0 if they cross."""
     if len(crossings(one, other)):
         return 0.0
     found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]

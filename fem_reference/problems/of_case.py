@@ -167,7 +167,7 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that a case omitted, from its set-up and its problem; None where the case omitted none."""
+    """The watch for effects that a case omitted, from its set-up and its problem; None if the case omitted none."""
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle

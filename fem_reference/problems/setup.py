@@ -36,7 +36,7 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the Gaussian rounding of
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None if it rests, the allowed error and the Gaussian rounding of
     its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, on which the vertices of the surface lie.
     """
 
@@ -49,7 +49,7 @@ class Bone:
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the bone's rest frame; InputError where the surface of a file is not closed."""
+        """The signed distance to the surface, in the bone's rest frame; InputError if the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
         error, rounding = self.distance_error, self.distance_rounding
         return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())
@@ -149,7 +149,7 @@ class Setup:
 def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     """The joints of a case; where it names none, one for each bone that rotates, with the bone's name and the axis of its motion.
 
-    InputError where a bone does not rotate about the axis of its joint, as the joint would have no angle.
+    InputError if a bone does not rotate about the axis of its joint, as the joint would have no angle.
     """
     if not case.joint:
         moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)

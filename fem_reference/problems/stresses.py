@@ -56,7 +56,7 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
 @dataclass(frozen=True)
 class StressSizes:
     """Sizes of stresses [MPa] in a state, root mean square over the volume: that of the acting effects without pressure (``acts``),
-    and that of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN where no
+    and that of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN if no
     tetrahedron has a positive volume.
     """
 
@@ -179,7 +179,7 @@ class Watch:
         assert found is not None  # effects that were left out have one
         if stresses is not None:
             guessed = 0.0 if "fibre" in effect.needs else found.stress
-            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is
+            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN if either is
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:

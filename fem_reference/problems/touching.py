@@ -48,7 +48,7 @@ class Touching:
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
@@ -86,7 +86,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
 
 
 def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints]) -> None:
-    """Raise InputError where a pair of facets is under two laws, whose pressures would add up."""
+    """Raise InputError if a pair of facets is under two laws, whose pressures would add up."""
     names = {name for law in touching for name in (law.one, law.other)}
     own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
     for (i, law), (j, other) in combinations(enumerate(touching), 2):

@@ -178,7 +178,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read."""
+        """Raise InputError if a scene file names a file that, links followed, is outside the folders that it may read."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
@@ -188,7 +188,7 @@ class Case(Record):
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     def check_solvers(self) -> None:
-        """Raise InputError where a scene file chooses the solver that runs a program."""
+        """Raise InputError if a scene file chooses the solver that runs a program."""
         candidates = ((f"candidate[{i}]", one) for i, one in enumerate(self.candidate))
         for key, one in (("reference", self.reference), *candidates):
             if self.from_file and one.solver == COMMAND:
@@ -226,7 +226,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """True where there is such a file or folder; False also for text that cannot be a path."""
+    """True if there is such a file or folder; False also for text that cannot be a path."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long or contains a null character

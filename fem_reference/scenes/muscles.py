@@ -44,12 +44,12 @@ class MusclesCase(DrivenCase):
 
     @property
     def touching(self) -> MuscleContact | None:
-        """The contact between the muscles, None where there is none."""
+        """The contact between the muscles, None if there is none."""
         return among(self.effect)
 
     @property
     def apart(self) -> bool:
-        """True where muscles must not cross: contact acts between them, or was left out because they do not come near."""
+        """True if muscles must not cross: contact acts between them, or was left out because they do not come near."""
         return any(isinstance(one, MuscleContact) for one in (*self.effect, *(some.effect for some in self.decisions)))
 
     @property

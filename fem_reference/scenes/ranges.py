@@ -59,7 +59,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError where a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
+    """Raise InputError if a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")
