@@ -26,6 +26,25 @@ _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 # Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
 _FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
 _STEPS = ("1", "10", "40")
+# Runs on other meshes, as a sentence of the verb stress has them.
+_MESHES = re.compile(
+    r"on other meshes: ((?:\d+ [a-z ]+(?:, )?)+), up to frame ([\d to]+), apart by (\S+) % at most, (\S+) % in"
+)
+_JITTERED = tuple(
+    f"neighbours.{name}"
+    for name in (
+        "at_once",
+        "bars",
+        "edges_cross",
+        "gives_way",
+        "held_through",
+        "narrow",
+        "overlap",
+        "row",
+        "rubs",
+        "slides_off",
+    )
+)
 _BESIDE = ("measurement", "model")
 _RESTS = "source of the measured number"
 _ARMS = ("mean", "least", "greatest")
@@ -656,6 +675,25 @@ def _stress_steps() -> str:
     return table("stress", ("case", "verdict", "to frame", "1 step", "10 steps", "40 steps"), rows)
 
 
+def _jitters(found: dict[str, Any]) -> Any:
+    """By case, the verdict and status on its own mesh, and runs on other meshes; none where a run takes too long."""
+    rows = []
+    for cell in (cell for one in found.values() for cell in one["cells"]):
+        said = _MESHES.search(cell["sentence"])
+        rows.append({key: cell[key] for key in ("case", "verdict", "status")} | {"meshes": said and said.groups()})
+    return rows
+
+
+def _jitters_rows() -> str:
+    rows = []
+    for one in kept("stress_jitters")["measured"]:
+        ended, frames, most, median = one["meshes"] or ("not measured: too long", "", "", "")
+        shares = (f"{share} %" if share else "" for share in (most, median))
+        rows.append((f"`{one['case'].partition('.')[2]}`", one["status"], ended, frames, *shares))
+    head = ("case", "on its own mesh", "on ten other meshes", "up to frame", "greatest distance", "median distance")
+    return table("stress_jitters", head, rows)
+
+
 def _solvers(found: dict[str, Any]) -> Any:
     kept = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
     rows = []
@@ -782,6 +820,7 @@ MEASUREMENTS = {
     "stress_programs": Measurement(
         f"./fem stress {_HARD} " + " ".join(f"--program candidates/{name}" for name in _FAST_PROGRAMS), _hard_programs
     ),
+    "stress_jitters": Measurement("./fem stress CASE --solver fenicsx --jitters 10", _jitters, _JITTERED),
     "uncertainty": Measurement("./fem uncertainty hip_flexion", _uncertainty),
     "uncertainty_iliacus": Measurement(
         "./fem uncertainty iliacus_anatomical --set muscle.tet_size=7mm --set frames.last=100", _uncertainty
@@ -814,6 +853,7 @@ TABLES = {
     "fibre_choice": _fibre_choice_rows,
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
+    "stress_jitters": _jitters_rows,
     "stress_programs_verdicts": _hard_programs_rows,
     "stress_programs_left_out": _hard_programs_left_out,
     "uncertainty_bands": partial(_uncertainty_bands, "uncertainty"),

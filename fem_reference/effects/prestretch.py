@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fem_reference.effects import Prestrain, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
+from fem_reference.foundations.records import rule
 
 
 class Prestretch(Ramped, Prestrain):
@@ -20,11 +21,10 @@ class Prestretch(Ramped, Prestrain):
     example: ClassVar[dict[str, Any]] = {"stretch": 1.1}
     stretch: float = Field(gt=0)
 
-    @model_validator(mode="after")
-    def _check_stretch(self) -> "Prestretch":
-        if any(1 + knot.amount * (self.stretch - 1) <= 0 for knot in self.ramp):
-            raise ValueError("a ramp whose stretches 1 + amount (stretch - 1) are above zero")
-        return self
+    _check_stretch = rule(
+        lambda one: all(1 + knot.amount * (one.stretch - 1) > 0 for knot in one.ramp),
+        "a ramp whose stretches 1 + amount (stretch - 1) are above zero",
+    )
 
     def indicator(self, scene: Estimates) -> Indicator:
         """The shortening of fibres as they are released, and the resulting stress of the matrix."""

@@ -7,7 +7,8 @@ from difflib import get_close_matches
 from itertools import pairwise
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError, model_validator
+import pydantic
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from fem_reference.foundations.errors import InputError
 
@@ -23,16 +24,32 @@ class Record(BaseModel):
     )
 
 
-def one_of(*keys: str) -> Any:
-    """A check of a record: exactly one of its ``keys`` has a value."""
+def rule(holds: Callable[[Any], object], want: str) -> Any:
+    """A check of a record that is an error, with the text ``want``, unless it ``holds`` for the record."""
 
     def check(record: Any) -> Any:
-        if sum(getattr(record, key) is not None for key in keys) != 1:
-            named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
-            raise ValueError(f"exactly one of {named}")
+        if not holds(record):
+            raise ValueError(want)
         return record
 
-    return model_validator(mode="after")(check)
+    return pydantic.model_validator(mode="after")(check)
+
+
+def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str) -> Any:
+    """A check of a ``key`` of a record, as :func:`rule`; ``holds`` gets its value, and those of the keys before it by name."""
+
+    def check(value: Any, info: Any) -> Any:
+        if not holds(value, info.data):
+            raise ValueError(want)
+        return value
+
+    return pydantic.field_validator(key)(check)
+
+
+def one_of(*keys: str) -> Any:
+    """A check of a record: exactly one of its ``keys`` has a value."""
+    named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
+    return rule(lambda one: sum(getattr(one, key) is not None for key in keys) == 1, f"exactly one of {named}")
 
 
 def increasing(values: Sequence[float] | None, want: str) -> Any:

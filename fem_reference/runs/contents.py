@@ -4,16 +4,16 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Name, Record, increasing
+from fem_reference.foundations.records import Name, Record, increasing, rule
 from fem_reference.io import files, texts
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
@@ -63,11 +63,10 @@ class Contents(Record):
     origin: Origin
     parts: tuple[str, ...]
 
-    @model_validator(mode="after")
-    def _check_scalars(self) -> Self:
-        if any(len(values) != len(self.numbers) for values in self.scalars.values()):
-            raise ValueError("as many values of each of the scalars as there are numbers of frames")
-        return self
+    _check_scalars = rule(
+        lambda one: all(len(values) == len(one.numbers) for values in one.scalars.values()),
+        "as many values of each of the scalars as there are numbers of frames",
+    )
 
 
 def frame_file(number: float, suffix: str) -> str:

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from fem_reference.effects import Effect
 from fem_reference.foundations.limits import Range
 from fem_reference.foundations.motion import RigidMotion
-from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
+from fem_reference.foundations.records import Name, Record, directed, increasing, key_rule, one_of, rule
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
@@ -81,19 +81,12 @@ class CaseBox(Record):
     size: Point
     rounding: Length = 0.0
 
-    @field_validator("size")
-    @classmethod
-    def _check_size(cls, size: Vector) -> Vector:
-        if not min(size) > 0:
-            raise ValueError("three lengths above zero")
-        return size
-
-    @field_validator("rounding")
-    @classmethod
-    def _check_rounding(cls, rounding: float, info: ValidationInfo) -> float:
-        if "size" in info.data and not 0 <= rounding <= min(info.data["size"]) / 2:
-            raise ValueError("a length from 0 to half of the shortest edge")
-        return rounding
+    _check_size = key_rule("size", lambda size, _: min(size) > 0, "three lengths above zero")
+    _check_rounding = key_rule(
+        "rounding",
+        lambda rounding, keys: "size" not in keys or 0 <= rounding <= min(keys["size"]) / 2,
+        "a length from 0 to half of the shortest edge",
+    )
 
 
 class CaseSphere(Record):
@@ -110,12 +103,11 @@ class Rod(Record):
     end: Point
     radius: PositiveLength
 
-    @field_validator("end")
-    @classmethod
-    def _check_end(cls, end: Vector, info: ValidationInfo) -> Vector:
-        if "start" in info.data and not math.dist(info.data["start"], end) > 1e-9:
-            raise ValueError("a point other than the start")
-        return end
+    _check_end = key_rule(
+        "end",
+        lambda end, keys: "start" not in keys or math.dist(keys["start"], end) > 1e-9,
+        "a point other than the start",
+    )
 
 
 class CaseBone(Record):
@@ -230,15 +222,12 @@ class Frames(Record):
     every: int = Field(gt=0)
     interval: Time | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.last <= self.first or (self.last - self.first) % self.every:
-            raise ValueError("last = first + a multiple of every")
-        if (self.last - self.first) // self.every >= MOST_FRAMES:
-            raise ValueError(f"at most {MOST_FRAMES} frames")
-        if self.last > LAST_FRAME:
-            raise ValueError(f"frame numbers up to {LAST_FRAME}")
-        return self
+    _check_last = rule(
+        lambda one: one.last > one.first and (one.last - one.first) % one.every == 0,
+        "last = first + a multiple of every",
+    )
+    _check_count = rule(lambda one: (one.last - one.first) // one.every < MOST_FRAMES, f"at most {MOST_FRAMES} frames")
+    _check_numbers = rule(lambda one: one.last <= LAST_FRAME, f"frame numbers up to {LAST_FRAME}")
 
     @property
     def numbers(self) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
-from fem_reference.foundations.records import Record, increasing, one_of
+from fem_reference.foundations.records import Record, increasing, one_of, rule
 from fem_reference.scenes.case import Case, Standard
 
 _Nodes = Annotated[
@@ -23,11 +23,7 @@ class Interval(Record):
     count: int = Field(ge=2, le=1_000_000)
     seed: int | None = Field(default=None, ge=0)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.end <= self.start:
-            raise ValueError("an end beyond the start")
-        return self
+    _check = rule(lambda one: one.end > one.start, "an end beyond the start")
 
 
 class MeshFiles(Record):

@@ -29,7 +29,7 @@ from fem_reference.problems.tendons import force_name
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.runs.stress_statistics import stress_scalars
+from fem_reference.runs.stress_statistics import stress_scalars, volume_ratio
 from fem_reference.runs.views import force_between, frame_of
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
@@ -123,7 +123,10 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
         own, note = dict[str, float](), ""
         for span in spans:
             others = tuple(name for name in names if name != span.name)
-            one = each[span.name](frame_of(frame, span, others), is_first=is_first)
+            part = frame_of(frame, span, others)
+            one = each[span.name](part, is_first=is_first)
+            assert part.state is not None  # of a muscle
+            own[f"{span.name}.volume_ratio"] = volume_ratio(problem.problems[span.name].mesh, part.state)
             new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
             for other in others:
                 new |= _on_other(frame, span.name, other)
