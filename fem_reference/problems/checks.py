@@ -24,18 +24,20 @@ from fem_reference.problems.body import (
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
-SAME = 1e-6  # share of the body's size by which two regions that prescribe the same may differ
+SAME = 1e-6  # share of the body's size by which two prescriptions of one displacement may differ
 _FLAT = 1e-9  # a cell counts as flat below this share of its longest edge cubed
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, too much for 16 digits
+_THINNEST = (
+    1e6  # length over thickness of a cell: stiffnesses differ by the square of this ratio, too much for 16 digits
+)
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
-    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that it
-    needs exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
+    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all required regions and fibre directions
+    exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -231,7 +233,7 @@ def _check_needs(body: Body) -> None:
 def check_agreement(body: Body) -> None:
     """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
     friction is combined with tension at rest, two regions of its surface prescribe different exact displacements at shared places,
-    or a path of motion cannot be followed. Displacements are compared at all frames, all stops, and the middles between them.
+    or a path of motion cannot be followed. Displacements are compared at all frames, at all stops, and halfway between them.
     """
     regions.check(body)
     directions.check_normals(body)
@@ -263,7 +265,7 @@ def _check_start(body: Body) -> None:
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:
-    """The corners that two regions share, and the middles of the edges that they share (n, 3) [mm]."""
+    """The corners, and the middles of edges, that two regions share (n, 3) [mm]."""
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:

@@ -1,4 +1,4 @@
-"""Checks of the fibre directions of a body, and of the normals about which laws turn them."""
+"""Checks of the fibre directions of a body, and of the normals about which laws turn fibres."""
 
 import math
 

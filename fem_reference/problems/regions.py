@@ -20,7 +20,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 _LEAST = 0.5  # the least sum of the shares of all laws of a kind at a point
-# The least accepted value of the greatest share in a region, which is low where the width exceeds the depth.
+# The least accepted value of the greatest share in a region, which is low if the width exceeds the depth.
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the rounding error of a sum of shares
 _SURE = 0.99  # a greatest share in a region is reported if it is below this

@@ -34,7 +34,7 @@ class Flux:
 class FieldProblem:
     """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
     for order 2 the middles of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the share of each cell above the mean y;
-    ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
+    ``tau`` (m,) of the stabilised form, None for the plain form; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
     mesh: FieldMesh
@@ -69,7 +69,7 @@ class FieldProblem:
 
     @property
     def form(self) -> str:
-        """The weak form: galerkin, or supg where it is stabilised."""
+        """The weak form: galerkin, or supg if it is stabilised."""
         return "galerkin" if self.tau is None else "supg"
 
     @property
@@ -158,7 +158,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
-    """The values (n,) at vertices that files of bounds prescribe, NaN if there is none."""
+    """The values (n,) at vertices that files of bounds prescribe, NaN without a value."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
@@ -179,7 +179,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the middles of edges: the mean of the values of both ends on the rim where both have one, else NaN."""
+    """The values (e,) at the middles of edges: on the rim the mean of the values of both ends if both have a value, else NaN."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -231,7 +231,7 @@ def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
-    """The nodes on facets: their vertices, and for order 2 the middles of those that are edges."""
+    """The nodes on facets: their vertices, and for order 2 the middles of facets that are edges."""
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices

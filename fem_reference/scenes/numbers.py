@@ -23,7 +23,7 @@ def parts(key: str) -> list[str | int]:
 
 
 def canonical(key: str) -> str:
-    """The one way to write a ``key``.
+    """The canonical text of a ``key``.
 
     >>> canonical("effect.0.mu"), canonical("effect[00].ramp[1].amount")
     ('effect[0].mu', 'effect[0].ramp[1].amount')
@@ -114,7 +114,7 @@ def _field(case: Case, key: str) -> Any:
 
 
 def _along(case: Case, key: str) -> list[Any]:
-    """The ``case`` and the values along the parts of a ``key``, each inside the one before; InputError if one does not exist."""
+    """The ``case`` and the values along the parts of a ``key``, each inside the previous one; InputError if one does not exist."""
     found: list[Any] = [case]
     for part in parts(key):
         inside = found[-1]
