@@ -22,7 +22,7 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where known, the way in which it
+    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens if known, the way in which it
     was taken from the publication (``how``), and the kind of text in which it was read (``read_in``).
     """
 
@@ -47,7 +47,7 @@ class Fact(Record):
 
 class Experiment(Record):
     """An experiment of a ``kind``: measurement, model, or bands (numbers of several publications). Its ``specimen``, its
-    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a whole curve, in the folder of
+    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a full curve, in the folder of
     ``FEM_REFERENCE_DATA``.
     """
 
@@ -62,7 +62,7 @@ class Experiment(Record):
 
 
 def facts(folder: Path = FOLDER) -> Iterator[Fact]:
-    """Every measured number of a ``folder``; InputError, with the line, where one is incomplete."""
+    """Every measured number of a ``folder``; InputError, with the line, if a number is incomplete."""
     with (folder / NAME).open(encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file, strict=True), 2):
             yield _fact(row, f"{NAME}:{line}")
@@ -107,7 +107,7 @@ def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two facts, and its standard deviation as if they were independent; NaN if one has none."""
+    """The ratio of two facts, and its standard deviation as if they were independent; NaN if one of them has no deviation."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)

@@ -27,7 +27,7 @@ def to_surface(run: Run, reference: Run) -> Floats:
 
 def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
     """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN for vertices
-    that are exempt from contact or unknown. None if a bone is not closed: it has no inside.
+    that are exempt from contact or unknown. None if a bone is not closed and so has no inside.
     """
     gaps = np.full(run.positions.shape[:2], DISTANCE_MARGIN)
     try:
@@ -42,7 +42,7 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
     """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm]: the length of the pieces that meet at a
-    point over that at rest.
+    point over their length at rest.
     """
     count = len(lines.points)
     joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next

@@ -33,7 +33,7 @@ class CurrentMeasures:
 
     @property
     def points(self) -> Floats:
-        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points where it has no surface."""
+        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points if it has no surface."""
         inside = self.candidate.fibre_positions
         return self.candidate.positions if self.candidate.has_surface or inside is None else inside
 
@@ -45,13 +45,13 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The folder of the reference in the store, named by scene, settings and code; its solver where it has no folder."""
+        """The folder of the reference in the store, named by scene, settings and code; its solver if it has no folder."""
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 
     @property
     def by_name(self) -> dict[str, Measure]:
-        """The measures by ``metric.statistic``, without those that repeat another in per cent."""
+        """The measures by ``metric.statistic``, without measures that repeat another in per cent."""
         found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 

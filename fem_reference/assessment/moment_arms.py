@@ -1,5 +1,5 @@
-"""Moment arms of fibres beside published ones: a polynomial fit of length over angle, the share of poses whose arm is within the
-fibres' range, and the overlap of two ranges.
+"""Moment arms of fibres compared with published arms: a polynomial fit of length over angle, the share of poses whose arm is within
+the fibres' range, and the overlap of two ranges.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ class ArmRange:
     high: Floats
 
     def at(self, angles: Floats) -> "ArmRange":
-        """The range at other ``angles`` (b,) [deg], linear in between; NaN if it does not reach."""
+        """The range at other ``angles`` (b,) [deg], linear in between; NaN beyond its ends."""
         within = (angles >= self.angles.min()) & (angles <= self.angles.max())
         low, high = (np.interp(angles, self.angles, side) for side in (self.low, self.high))
         return ArmRange(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
@@ -53,7 +53,7 @@ def range_of(angles: Floats, arms: Floats) -> ArmRange:
 
 def share_inside(curve: Floats, found: ArmRange) -> float:
     """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, among the poses in which it is known; NaN
-    where it is known in none. A range that is not a number contains nothing.
+    if it is known in no pose. A range of NaN contains nothing.
     """
     known = np.isfinite(curve)
     if not known.any():
@@ -74,12 +74,12 @@ def overlap(found: ArmRange, published: ArmRange) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ArmsBeside:
-    """Arms of a muscle's fibres in a run of ``case`` beside a published curve or range of an ``experiment``: at ``angles`` (a,)
-    [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, the ``published`` range, whose sides are equal where
-    it is one curve.
+    """Arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at ``angles``
+    (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose ends are
+    equal for a curve.
 
-    ``kind``: that of the experiment; ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run;
-    ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
+    ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive arms; ``setting``: the resolution of the
+    run; ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str

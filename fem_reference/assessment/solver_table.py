@@ -17,8 +17,8 @@ FILE = Path(__file__).with_suffix(".toml")
 
 
 class SolverKind(Record):
-    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in pluses and
-    minuses, the numbers of its ``literature`` there, and names of candidates of cases that stand for it, ``of_case``.
+    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in plus and
+    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, names of candidates of cases that represent it.
     """
 
     name: str
@@ -58,10 +58,9 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
-    against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
-    parameters that a user must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are no
-    answer, empty if they are one.
+    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
+    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the parameters that a user
+    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are no answer, else empty.
     """
 
     kind: str
@@ -97,7 +96,7 @@ class Scenario:
 @dataclass(frozen=True)
 class Overall:
     """A solver's worst frames over scenarios: the ``median`` of their magnitudes over the ``count`` scenarios in which every frame
-    has a number, the ``worst`` of these magnitudes and its ``case``, and the cases on which the solver was ``lost``.
+    has a number, the ``worst`` of these magnitudes and its ``case``, and the ``lost`` cases, on which the solver failed.
     """
 
     median: float
