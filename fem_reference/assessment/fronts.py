@@ -76,11 +76,6 @@ class Point:
         """The share of the machine that other processes kept busy during its run; NaN where that is not known."""
         return self.costs.get(LOAD, math.nan)
 
-    @property
-    def is_loaded(self) -> bool:
-        """True where its time was measured on a machine that was busy with other work."""
-        return self.load > LOADED
-
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
         """Its error and its cost, None where one is not known or not above zero."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
