@@ -72,12 +72,12 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_bone(points: Floats) -> Floats:
         return np.maximum(-shape.distances(points), 0.0) if len(points) else np.zeros(0)
 
-    def into_body(points: Floats) -> Floats:
-        return depths_within(local, points, of_body)
+    def into_body(points: Floats) -> Floats:  # where the body is, whose boxes serve all bones
+        return depths_within(body, apply(pose, points), of_body)
 
     tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((local, of_body), (bone, of_bone)))
     first = _of_surface(local, of_body, into_bone, tips, into_bone(local.points[tips]) > 0)
-    second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(local, bone.points[bone_tips]))
+    second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(body, apply(pose, bone.points[bone_tips])))
     count = len(local.points) + len(local.triangles)
     joined = Depths(*(np.concatenate(arrays) for arrays in zip(first, (second[0] + count, *second[1:]), strict=True)))
     return replace(joined, places=apply(pose, joined.places))
