@@ -57,14 +57,6 @@ static void widen(Box *box, const Box *other)
     }
 }
 
-static int apart(const Box *one, const Box *other)
-{
-    for (int i = 0; i < 3; i++)
-        if (one->low[i] > other->high[i] || other->low[i] > one->high[i])
-            return 1;
-    return 0;
-}
-
 /* The cell of a coordinate rises with it, so that two boxes that touch share the cell of their greatest low corner. */
 static void place(const Grid *grid, Box *box)
 {
@@ -129,10 +121,15 @@ static int side(const double *normal, double (*points)[3], int count, double wit
 /* Two triangles with one corner in common, the origin: whether a plane through it certainly separates their other corners. */
 static int parted_at_corner(double (*a)[3], double (*b)[3], double size)
 {
-    double normal[3], across[3], within = SURE * size * size;
+    double normal[3], across[3], up[2], down[2], within = SURE * size * size;
     for (int i = 0; i < 3; i++)
         normal[i] = a[0][i] + a[1][i] - b[0][i] - b[1][i];
-    if (side(normal, a, 2, within) * side(normal, b, 2, within) < 0)
+    for (int k = 0; k < 2; k++)
+        for (int i = up[k] = down[k] = 0; i < 3; i++) {
+            up[k] += normal[i] * a[k][i];
+            down[k] -= normal[i] * b[k][i];
+        }
+    if ((LESS(up[0], up[1]) > within) & (LESS(down[0], down[1]) > within))
         return 1;
     for (int turn = 0; turn < 2; turn++) {
         double (*one)[3] = turn ? b : a, (*other)[3] = turn ? a : b;
@@ -174,12 +171,12 @@ static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t
     const int64_t *names = one->corners + 3 * s, *others = other->corners + 3 * t;
     int shared = 0, mine = 0, its = 0;
     for (int i = 0; i < 3 && one->points == other->points; i++)
-        for (int j = 0; j < 3; j++)
-            if (names[i] == others[j]) {
-                shared++;
-                mine = i;
-                its = j;
-            }
+        for (int j = 0; j < 3; j++) { /* no branches, which would be guessed wrongly */
+            int same = names[i] == others[j];
+            shared += same;
+            mine += same * i;
+            its += same * j;
+        }
     if (shared > 1)
         return 0;
     if (!(size > 1e-50)) /* its powers would underflow */
@@ -245,13 +242,20 @@ Grid *sorted(Surface surface)
     return NULL;
 }
 
-/* Add the pair s and t if they may meet; each once, in the cell of the greater of the low corners of both boxes. */
-static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *its, const int *cell)
+/* Whether boxes meet, and the cell is that of the greater of their low corners, so that each pair is met once; no branches. */
+static int meet_in(const int *cell, const Box *one, const Box *other)
 {
-    for (int i = 0; i < 3; i++)
-        if (cell[i] != MORE(box->first[i], its->first[i]))
-            return;
-    if (apart(box, its) || !may_meet(found->one, s, found->other, t, box->size + its->size))
+    int found = 1;
+    for (int i = 0; i < 3; i++) {
+        found &= (one->low[i] <= other->high[i]) & (other->low[i] <= one->high[i]);
+        found &= cell[i] == MORE(one->first[i], other->first[i]);
+    }
+    return found;
+}
+
+static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *its)
+{
+    if (!may_meet(found->one, s, found->other, t, box->size + its->size))
         return;
     if (found->count < found->room) {
         found->pairs[2 * found->count] = s;
@@ -260,27 +264,53 @@ static void add(Found *found, int64_t s, const Box *box, int64_t t, const Box *i
     found->count++;
 }
 
+/* Add the pairs of triangle s with those of the cell in inside, from first to last. */
+static void add_in(Found *found, const Grid *grid, const int *cell, int64_t s, const Box *box, int64_t first, int64_t last)
+{
+    int64_t near[32];
+    while (first < last) {
+        int count = 0;
+        for (int64_t end = LESS(last, first + 32); first < end; first++) {
+            near[count] = grid->inside[first];
+            count += meet_in(cell, box, grid->boxes + near[count]);
+        }
+        for (int k = 0; k < count; k++)
+            add(found, s, box, near[k], grid->boxes + near[k]);
+    }
+}
+
 static void add_of_one(Found *found, const Grid *grid)
 {
     Box whole = {{0}, {0}, 0, {0}, {grid->size[0] - 1, grid->size[1] - 1, grid->size[2] - 1}};
     EVERY_CELL(whole)
-        for (int64_t i = grid->starts[at]; i < grid->starts[at + 1]; i++)
-            for (int64_t k = i + 1; k < grid->starts[at + 1]; k++) {
-                int64_t s = grid->inside[i], t = grid->inside[k];
-                add(found, s, grid->boxes + s, t, grid->boxes + t, (int[]){x, y, (int)z});
-            }
+        for (int64_t i = grid->starts[at]; i < grid->starts[at + 1]; i++) {
+            int64_t s = grid->inside[i];
+            add_in(found, grid, (int[]){x, y, (int)z}, s, grid->boxes + s, i + 1, grid->starts[at + 1]);
+        }
+}
+
+/* Whether a triangle is on one side of a box along an axis. */
+static int beyond(const Surface *s, int64_t t, const Box *box)
+{
+    const double *p[3];
+    for (int c = 0; c < 3; c++)
+        p[c] = s->points + 3 * s->corners[3 * t + c];
+    for (int i = 0; i < 3; i++)
+        if ((p[0][i] < box->low[i] && p[1][i] < box->low[i] && p[2][i] < box->low[i])
+            || (p[0][i] > box->high[i] && p[1][i] > box->high[i] && p[2][i] > box->high[i]))
+            return 1;
+    return 0;
 }
 
 static void add_of_two(Found *found, const Grid *grid)
 {
     for (int64_t s = 0; s < found->one->count; s++) {
-        Box box = box_of(found->one, s);
-        if (apart(&box, &grid->hull))
+        if (beyond(found->one, s, &grid->hull))
             continue;
+        Box box = box_of(found->one, s);
         place(grid, &box);
         EVERY_CELL(box)
-            for (int64_t i = grid->starts[at]; i < grid->starts[at + 1]; i++)
-                add(found, s, &box, grid->inside[i], grid->boxes + grid->inside[i], (int[]){x, y, (int)z});
+            add_in(found, grid, (int[]){x, y, (int)z}, s, &box, grid->starts[at], grid->starts[at + 1]);
     }
 }
 

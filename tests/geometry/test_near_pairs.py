@@ -63,6 +63,34 @@ def test_of_two_surfaces_none_that_touches_is_left_out() -> None:
     assert {pair[::-1] for pair in pairs(*soups[::-1])} == kept
 
 
+def test_of_a_crowd_in_one_place_none_is_left_out() -> None:
+    # 70 triangles of all directions through one point, in the same cells: each meets each.
+    rng = np.random.default_rng(5)
+    crowds = []
+    for _ in range(2):
+        corners = rng.normal(size=(70, 3, 3))
+        corners[:, 2] = -(corners[:, 0] + corners[:, 1])  # the origin is in the middle of each
+        crowds.append(Surface(corners.reshape(-1, 3), np.arange(210).reshape(70, 3)))
+    assert pairs(*crowds) == set(itertools.product(range(70), repeat=2))
+    itself = {tuple(sorted(pair)) for pair in pairs(crowds[0], crowds[0])}
+    assert itself == set(itertools.combinations(range(70), 2))
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_what_touches_the_whole_of_the_other_from_outside_is_kept(axis, side) -> None:
+    ball = shapes.sphere(2, 30.0)
+    tip = ball.points[np.argmax(side * ball.points[:, axis])]
+    outwards = np.zeros(3)
+    outwards[axis] = 5.0 * side
+    around = np.roll([0.0, 3.0, 0.0], axis)
+    beside = Surface(np.array([tip, tip + outwards + around, tip + outwards - around]), np.array([[0, 1, 2]]))
+    touched = {t for t, corners in enumerate(ball.points[ball.triangles]) if (corners == tip).all(axis=1).any()}
+    assert {t for _, t in pairs(beside, ball)} >= touched
+    assert pairs(beside.moved_to(np.nextafter(beside.points, beside.points + outwards)), ball) is not None
+    assert pairs(beside.moved_to(beside.points + outwards), ball) == set()
+
+
 @pytest.mark.parametrize("gap", [1e-6, 0.0, -1e-13])
 def test_a_gap_of_a_nanometre_is_certain_and_what_touches_is_kept(gap) -> None:
     plate = Surface(FLAT, np.array([[0, 1, 2]]))
