@@ -137,7 +137,7 @@ class MusclesProblem:
             assert law is not None  # without contact no pair may touch
             at = called(one, "free"), called(other, "free")
             removed = relaxed if self._near_at_rest(one, other) else None
-            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed))
+            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed, law.friction is None))
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
