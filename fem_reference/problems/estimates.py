@@ -1,6 +1,5 @@
 """Estimates for a muscle case before it is solved, and the effects that they show to be needed."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -27,8 +26,6 @@ from fem_reference.problems.guess import (
 )
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
-
-log = logging.getLogger(__name__)
 
 # An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
 # the surface where that is less. Error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of

@@ -173,11 +173,6 @@ def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[f
     return [found.get(number, []) for number in numbers]
 
 
-def _spread(first: int, end: int) -> NDArray[np.int64]:
-    """At most ``POINTS`` indices from ``first`` up to ``end``, both ends among them."""
-    return np.unique(np.linspace(first, end - 1, min(POINTS, end - first)).round().astype(np.int64))
-
-
 @np.errstate(invalid="ignore")
 def _top(values: list[Floats]) -> float:
     """The greatest magnitude that is finite."""
