@@ -11,6 +11,25 @@ from measurements.tables import Measurement, kept, table
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
 _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 _STEPS = ("1", "10", "40")
+# Runs on other meshes, as a sentence of the verb stress has them.
+_MESHES = re.compile(
+    r"on other meshes: ((?:\d+ [a-z ]+(?:, )?)+), up to frame ([\d to]+), apart by (\S+) % at most, (\S+) % in"
+)
+_JITTERED = tuple(
+    f"neighbours.{name}"
+    for name in (
+        "at_once",
+        "bars",
+        "edges_cross",
+        "gives_way",
+        "held_through",
+        "narrow",
+        "overlap",
+        "row",
+        "rubs",
+        "slides_off",
+    )
+)
 _FAST_PROGRAMS = ("mujoco_flex", "pypbd_xpbd")
 _HARD = "at_rest bones degenerate fibres hip incompressible moved_away round_edge squeeze_bonded squeeze_sliding start twist"
 
@@ -93,15 +112,36 @@ def _stress_steps() -> str:
     return table("stress", ("case", "verdict", "to frame", "1 step", "10 steps", "40 steps"), rows)
 
 
+def _jitters(found: dict[str, Any]) -> Any:
+    """By case, the verdict and status on its own mesh, and runs on other meshes; none where a run takes too long."""
+    rows = []
+    for cell in (cell for one in found.values() for cell in one["cells"]):
+        said = _MESHES.search(cell["sentence"])
+        rows.append({key: cell[key] for key in ("case", "verdict", "status")} | {"meshes": said and said.groups()})
+    return rows
+
+
+def _jitters_rows() -> str:
+    rows = []
+    for one in kept("stress_jitters")["measured"]:
+        ended, frames, most, median = one["meshes"] or ("not measured: too long", "", "", "")
+        shares = (f"{share} %" if share else "" for share in (most, median))
+        rows.append((f"`{one['case'].partition('.')[2]}`", one["status"], ended, frames, *shares))
+    head = ("case", "on its own mesh", "on ten other meshes", "up to frame", "greatest distance", "median distance")
+    return table("stress_jitters", head, rows)
+
+
 MEASUREMENTS = {
     "stress": Measurement("./fem stress --steps", _stress),
     "stress_programs": Measurement(
         f"./fem stress {_HARD} " + " ".join(f"--program candidates/{name}" for name in _FAST_PROGRAMS), _hard_programs
     ),
+    "stress_jitters": Measurement("./fem stress CASE --solver fenicsx --jitters 10", _jitters, _JITTERED),
 }
 TABLES = {
     "stress_solvers": _stress_solvers,
     "stress_steps": _stress_steps,
+    "stress_jitters": _jitters_rows,
     "stress_programs_verdicts": _hard_programs_rows,
     "stress_programs_left_out": _hard_programs_left_out,
 }

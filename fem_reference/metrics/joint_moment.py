@@ -1,10 +1,9 @@
-"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
+"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
+moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
+By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull at their
+ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
-A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
-space. By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull
-at their ends, via-points and obstacles. The force is not known for lines without ``hill``, nor for most fast solvers.
-
-The arm differs from that by the excursion of fibres: a bent matrix bears a moment with little force (docs/measures.md).
+The arm differs from the arm by the excursion of fibres: a bent matrix carries a moment with little force (docs/measures.md).
 """
 
 from functools import partial
@@ -39,7 +38,7 @@ _LEAST = 1e-6  # a force below this share of the greatest one is round-off and h
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN where no joint turns alone; the arm also without force."""
+    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN if no joint turns alone; the arm also without force."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):

@@ -61,7 +61,7 @@ def _scene_file(case: str | Path) -> Path:
 
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
-    """Change a key of a scene, or ``add`` one to a table that it has."""
+    """Change a key of a scene, or ``add`` a key to one of its tables."""
     *parents, last = numbers.parts(key)
     inside: Any = table
     try:
@@ -76,7 +76,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """The existing keys where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    """The existing keys, for ``parts`` of a key that does not exist, as the end of a sentence."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -113,7 +113,7 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself if it is one of a muscle; else InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself if it is the case of a muscle; else InputError at ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")
@@ -208,8 +208,8 @@ def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """Check that an effect acts once in each region (two of one name would share their unknowns), a load once on each part of the
-    surface, and that no bulk modulus is below the shear modulus of its region: that is usually a mistake in units.
+    """Check that an effect acts once in each region (two effects of one name would share their unknowns) and a load once on each
+    part of the surface, and that no bulk modulus is below the shear modulus of its region, which is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]

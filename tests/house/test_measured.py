@@ -81,6 +81,22 @@ def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
     assert kept["ends"] == [{"case": "twist", "verdict": "ok", "frame": 5, "off": off}]
 
 
+def test_runs_on_other_meshes_are_read() -> None:
+    """Sentences as ``studies.hard.following.on_meshes`` writes them; a case whose runs take too long has none."""
+    ended = "7 converged, 2 out of steps, 1 denied, up to frame 12 to 20, apart by 3.1 % at most, 0.2 % in the median; unstable"
+    found = {}
+    for case, sentence in (
+        ("one", f"ok; on other meshes: {ended}"),
+        ("two", "ok; no runs on other meshes, as one takes more"),
+    ):
+        found[case] = {"cells": [{"case": case, "verdict": "ok", "status": "converged", "sentence": sentence}]}
+    kept = measurements.MEASUREMENTS["stress_jitters"].keep(found)
+    assert [one["meshes"] for one in kept] == [
+        ("7 converged, 2 out of steps, 1 denied", "12 to 20", "3.1", "0.2"),
+        None,
+    ]
+
+
 def test_arms_about_an_axis_are_those_of_the_reference_and_a_pose_that_was_not_reached_has_the_status(
     monkeypatch,
 ) -> None:

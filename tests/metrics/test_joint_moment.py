@@ -119,6 +119,7 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, MeasurementConte
     return run, context_of(setup(case), run)
 
 
+@pytest.mark.slow
 def test_virtual_work(bar: tuple[Run, MeasurementContext]) -> None:
     """Without dissipation the moment is minus the slope of the energy, so that its integral over the angle is the energy.
 
@@ -155,6 +156,7 @@ def test_hip_flexion_as_shipped_does_the_work_of_its_moment(tmp_path: Path) -> N
     does_the_work_of_its_moment(run, context_of(setup(case), run).joints[0])
 
 
+@pytest.mark.slow
 def test_fibres_alone_have_the_arm_of_their_excursion_and_the_whole_muscle_has_not(tmp_path: Path) -> None:
     """`hip_flexion` on coarse tetrahedra, where contact is fully made: energies by effect, from the stored unknowns, make up the
     moment to 1 % (virtual work, by parabolas over 0.2 rad, without the little energy of contact).
@@ -247,6 +249,7 @@ def test_without_a_force_there_is_no_arm() -> None:
     assert_allclose(arms[1:], 32 / 5)
 
 
+@pytest.mark.slow
 def test_a_greater_scene_has_forces_and_moments_to_scale(tmp_path: Path) -> None:
     """No law has a length: all lengths ten times give arms ten times, forces 100 times and moments 1000 times.
 
@@ -307,6 +310,7 @@ def straight_arms(angle: float, beside: Floats) -> tuple[Floats, Floats]:
     return np.cross(end, start - end)[:, 0] / away, away / 40
 
 
+@pytest.mark.slow
 def test_a_muscle_that_is_nearly_a_line_has_one_arm_by_force_and_by_excursion(
     thread: tuple[Case, Run, MeasurementContext], tmp_path: Path
 ) -> None:

@@ -67,7 +67,7 @@ class Hill(Record):
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
         """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
-        tendon has no force. InputError where fibres would be shorter than a tenth of their optimal length.
+        tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
