@@ -145,9 +145,8 @@ class Fields:
         rest = lengths(lines.points)
         stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
         known = stretches[np.isfinite(stretches)]
-        low, high = (
-            float(np.percentile(known, share)) for share in (0.1, 99.9)
-        )  # so that no single piece sets the scale
+        # Percentiles, so that no single piece sets the scale.
+        low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))
         scale = {"low": min(low, 1.0), "high": max(high, 1.0)}
         return {"lines": np.diff(ends).tolist(), "rest": np.round(rest, 5).tolist(), **scale}
 
