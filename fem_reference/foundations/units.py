@@ -12,7 +12,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, TypeAdapter
 
 # The allowed units [mm] of coordinates in a file: in scenes, beside frames and on the command line. Quantities with a number may
 # have any unit of their kind; for coordinates a slip such as "Mm", 1e9 mm, would not be noticed.
@@ -32,11 +32,10 @@ class Kind(NamedTuple):
 
 _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 # The kinds by name, and the number of internal units in a common unit, by that and the internal one.
-KINDS = {
-    name: Kind(**{key: tuple(one) if isinstance(one, list) else one for key, one in kind.items()})
-    for name, kind in _FILE["kind"].items()
+KINDS = TypeAdapter(dict[str, Kind]).validate_python(_FILE["kind"])
+COMMON: dict[tuple[str, str], float] = {
+    (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
 }
-COMMON = {(unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()}
 # A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
