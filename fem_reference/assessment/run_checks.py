@@ -98,9 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points, and the rest of the
-    overlap at rest.
-    """
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap of points, and what rest leaves."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -243,9 +241,7 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (
-            one for one in posed if np.abs(points[:9] - one[:9]).max() <= near
-        )  # few frames need a full comparison
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
@@ -270,9 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; above the ``give`` only the part in excess of rest counts. Penetration to the middle of
-    a bone is never allowed.
-    """
+    """Penetration of a bone and the muscle; above the ``give`` only the excess over rest counts, and never to the bone's middle."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

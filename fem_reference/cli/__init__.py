@@ -26,9 +26,8 @@ _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder i
 def entry() -> None:
     """The installed command."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
-    os.environ.setdefault(
-        "OPENBLAS_NUM_THREADS", "1"
-    )  # numpy reads it when it is loaded; on a busy machine more threads would wait for each other
+    # Numpy reads it when it is loaded; on a busy machine more threads would wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(main(sys.argv[1:]))
 
 

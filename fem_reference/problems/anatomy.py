@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume, united
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry.coarsening import resampled
@@ -127,9 +127,7 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
         if len(clouds[name]) < 3:
             raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
         patches.append(fan(np.array(clouds[name]) + moved))
-    starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
-    triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
-    return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
+    return Surface(*united([(patch.points, patch.triangles) for patch in patches]), str(path))
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
