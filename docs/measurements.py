@@ -43,6 +43,8 @@ _JITTERED = tuple(
         "row",
         "rubs",
         "slides_off",
+        "squeezed",
+        "stiff",
     )
 )
 _BESIDE = ("measurement", "model")
