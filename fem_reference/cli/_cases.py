@@ -101,7 +101,7 @@ def command_parts(own: Iterable[Candidate]) -> list[Part]:
 
 
 def check_names(names: list[str]) -> None:
-    """InputError where two candidates have the same name, or one has the name of the reference."""
+    """InputError if two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
             raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")

@@ -1,4 +1,4 @@
-"""Fibres that are already stretched in the rest state of the mesh, as those of living muscle are."""
+"""Fibres that are already stretched in the rest state of the mesh, as in living muscle."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ class Prestretch(Ramped, Prestrain):
     """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)`` along
     the fibre f, at the same volume.
 
-    ``stretch``: without unit, above 1 where fibres are taut at rest.
+    ``stretch``: without unit, above 1 if fibres are taut at rest.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -27,7 +27,7 @@ class Prestretch(Ramped, Prestrain):
     )
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The shortening of fibres as they are released, and the stress of the matrix then."""
+        """The shortening of fibres as they are released, and the resulting stress of the matrix."""
         part = scene.greatest(self) * abs(self.stretch - 1)
         return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 

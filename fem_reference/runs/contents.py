@@ -1,4 +1,4 @@
-"""The contents of run.json as a record, read strictly: a damaged file is refused as a whole."""
+"""The contents of run.json as a record, read strictly: a damaged file is refused entirely."""
 
 import json
 from collections.abc import Mapping
@@ -70,7 +70,8 @@ class Contents(Record):
 
 
 def frame_file(number: float, suffix: str) -> str:
-    """The name of a file of the frame with a ``number``; ValueError where it is not whole, as two frames would share a file.
+    """The name of a file of the frame with a ``number``; ValueError if the number is not an integer, as two frames would share a
+    file.
 
     >>> frame_file(10, ".vtp")
     'frame_0010.vtp'
@@ -93,7 +94,7 @@ def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
 
 
 def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
-    """The names whose vectors of a ``kind`` have their components in ``scalars``.
+    """The names for which ``scalars`` contains the components of a vector of a ``kind``.
 
     >>> vector_names(dict.fromkeys(vector_scalars("force_on_femur", np.zeros(3))), "force_on_")
     ['femur']
@@ -102,7 +103,7 @@ def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
 
 
 def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Floats:
-    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError where ``name`` has none."""
+    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError if ``name`` has none."""
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
         known = ", ".join(vector_names(scalars, kind))
@@ -112,7 +113,7 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
 
 
 def point(centre: ArrayLike) -> Floats:
-    """The point (3,) [mm] that a ``centre`` is; InputError unless it is three finite numbers."""
+    """A ``centre`` as a point (3,) [mm]; InputError unless it is three finite numbers."""
     try:
         found = np.asarray(centre, float)
     except (TypeError, ValueError, OverflowError):

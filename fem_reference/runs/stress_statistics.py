@@ -17,9 +17,9 @@ _CUBIC, _WEIGHTS = np.vstack([np.full((4, 4), 1 / 6) + np.eye(4) / 3, np.full(4,
 
 
 def stress_scalars(results: Results, frame: float) -> dict[str, float]:
-    """The mean and quantiles [MPa] over the volume at rest by name, such as ``stress_von_mises_p95``, which 95 % of the volume do
-    not exceed. The Cauchy stress is taken at four points of each tetrahedron: its component along the fibres, where these are
-    known, the von Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN where a tetrahedron is inside out.
+    """The mean and quantiles [MPa] over the volume at rest by name. ``stress_von_mises_p95``, for example, is not exceeded in 95 %
+    of the volume. At four points of each tetrahedron the Cauchy stress gives its component along the fibres, if these are known,
+    the von Mises stress, and the pressure ``-tr sigma / 3``, above 0 in compression. NaN if a tetrahedron is inside out.
     """
     mesh = results.mesh
     tets = np.unique(np.linspace(0, len(mesh.tets) - 1, _MOST).astype(int))

@@ -112,8 +112,8 @@ class Rod(Record):
 
 class CaseBone(Record):
     """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; it rests without
-    ``motion``. ``distance_error``: the error allowed in the distance to a surface, root mean square near it, before rounding.
-    ``distance_rounding``: the standard deviation of a Gaussian mean of that distance, as nothing slides smoothly on flat triangles.
+    ``motion``. ``distance_error``: the allowed error of the distance to a surface, root mean square near it, before rounding.
+    ``distance_rounding``: the standard deviation of a Gaussian mean of this distance, as flat triangles prevent smooth sliding.
     """
 
     name: Name
@@ -152,8 +152,9 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often these are cut into eight.
-    ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often the tetrahedra are cut
+    into eight. ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut
+    into six.
     """
 
     surface: str
@@ -197,8 +198,9 @@ class Landmarks(Record):
 
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
-    the bone) and ``outline``. Springs of a ``stiffness`` over its area hold it; without a stiffness it moves exactly with the bone.
-    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone, which pulls only with the effect ``tendon``.
+    the bone) and ``outline``. Springs of a ``stiffness`` attach its area; without a stiffness it moves exactly with the bone.
+    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone; the tendon pulls only with the effect
+    ``tendon``.
     """
 
     name: Name
@@ -236,7 +238,9 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of a number of the case by its ``key``, such as ``effect[0].mu``; it replaces the range stated by the effect."""
+    """The range of a number of the case by its ``key``, such as ``effect[0].mu``. The range replaces the range stated by the
+    effect.
+    """
 
     key: str
 

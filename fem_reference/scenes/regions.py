@@ -34,7 +34,7 @@ class ClosedSurface(Record):
 
 
 class LabelledTets(Record):
-    """The part inside those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
+    """The part inside the tetrahedra of a VTU or MSH file with one of ``labels`` in an ``array`` of the cells."""
 
     file: str
     unit: LengthUnit
@@ -77,8 +77,8 @@ class CaseRegion(Record):
 
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
-    """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that does not exist, or one
-    of the ``regions`` is at another attachment than one of ``attachments``.
+    """Raise InputError that names a key below ``place`` if one of the ``effects`` acts in a region that does not exist, or one of
+    the ``regions`` is at an attachment that is not among ``attachments``.
     """
     laws = [
         (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))

@@ -61,7 +61,7 @@ class Boundary(Record):
     The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
     ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to the facets at whose vertices it is above zero.
     The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
-    values. The slope is 0 on the rest of the boundary.
+    values. On all other parts of the boundary the slope is 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -110,7 +110,7 @@ class ScalarCase(Case):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The one frame that a steady field has."""
+        """The only frame of a steady field."""
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:

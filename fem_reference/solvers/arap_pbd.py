@@ -122,7 +122,7 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 
 
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
-    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None where there is none.
+    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None if there is none.
 
     Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. It is solved
     for ``1 / lambda``, as this stays accurate where the cubic term nearly vanishes.

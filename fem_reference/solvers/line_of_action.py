@@ -91,7 +91,7 @@ class Shortest:
         return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside an obstacle or a path that was not found; None where there is none."""
+        """The trouble with a fixed point inside an obstacle or a path that was not found; None if there is none."""
         return self.wrong
 
     def frame(self, _: int) -> Frame:

@@ -94,7 +94,7 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty where none is inside."""
+        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty if none is inside."""
         found = []
         for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)

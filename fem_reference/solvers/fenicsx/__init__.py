@@ -147,7 +147,7 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True where external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
+    """True if external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
     solver's quadrature has to be of degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
@@ -210,7 +210,7 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
     ``attachment_error_max`` [mm]. It is not zero: exact attachments are facets of tets, which cover the vertices only roughly, and
-    springs yield. Empty where nothing is attached.
+    springs yield. Empty if nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -262,7 +262,7 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
 
 
 def _has_steps(problem: AnyMuscle) -> bool:
-    """True where an effect depends on velocities."""
+    """True if an effect depends on velocities."""
     return any("interval" in effect.needs for effect in problem.body.effects)
 
 
