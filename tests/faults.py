@@ -182,7 +182,7 @@ def planted(chosen: list[Fault]) -> int:
     counts = Counter[str]()
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         copy = Path(folder) / "copy"
-        ignored = shutil.ignore_patterns(".git", ".venv", "__pycache__", "reports")
+        ignored = shutil.ignore_patterns(".git", ".venv", "*.pyc.*", "reports")
         shutil.copytree(ROOT, copy, ignore=ignored)
         for fault in chosen:
             begin, text = time.perf_counter(), fingerprint(copy, fault)
