@@ -49,9 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has no
-    claims.
-    """
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: why a case has no claims."""
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]

@@ -229,8 +229,8 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why arms are ``missing``, and ``fits`` of laws
-    to the cubes.
+    """The evidence of all quantities: ``rows``; moment ``arms``; ``missing``: why a case has no arms; ``fits`` of laws to the
+    cubes.
     """
 
     rows: tuple[Row, ...]

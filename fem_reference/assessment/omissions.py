@@ -50,9 +50,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run ``name`` by ``solver``: the complete run (``whole``), and a run with each of the ``omissions``; ``kept``: names never
-    left out.
-    """
+    """Runs ``name`` by ``solver``: the complete one (``whole``), and one for each of ``omissions``; ``kept``: never left out."""
 
     name: str
     solver: str

@@ -185,9 +185,7 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
-    """A point of a study for another case: tetrahedra relative to those of the case, doubled in size for each refinement below
-    zero.
-    """
+    """A point of a study for another case: tetrahedra relative to the case's, doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point

@@ -188,9 +188,7 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which replaces ``path`` on success and is removed otherwise. An OSError names ``path``
-    and, if the disk is full, the free space.
-    """
+    """A file to write to, which replaces ``path`` on success. An OSError names ``path`` and, on a full disk, the free space."""
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
     try:

@@ -269,9 +269,7 @@ def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with each point outside the ``surface`` moved to the nearest point of the surface, as there is no solution
-    outside.
-    """
+    """The fibres with points outside the ``surface`` moved to its nearest points, as there is no solution outside."""
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

@@ -96,9 +96,7 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, the stress of this energy with the prestrains of
-    ``acting``.
-    """
+    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, its stress with the prestrains of ``acting``."""
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)

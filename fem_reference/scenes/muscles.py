@@ -73,9 +73,7 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution, without expectations; also ``apart``, if the second check tests whether muscles
-        cross although no effect shows this.
-        """
+        """The keys that determine the solution, without expectations; and ``apart``, which the second check uses."""
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
         own = [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
@@ -105,9 +103,7 @@ class MusclesCase(DrivenCase):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles precede the effects
-        on this one.
-        """
+        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles come first."""
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):

@@ -27,9 +27,7 @@ Four = tuple[float, float, float, float]
 
 
 class Contacts(NamedTuple):
-    """The checked vertices (k,), their values of the constraint (k,) [mm], and the unit vectors (k, 3) along which these
-    increase.
-    """
+    """The checked vertices (k,), the values of their constraint (k,) [mm], and unit vectors (k, 3) along which they increase."""
 
     vertices: Ints
     value: Floats
