@@ -229,9 +229,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``; moment ``arms``; ``missing``: why a case has no arms; ``fits`` of laws to the
-    cubes.
-    """
+    """The evidence of all quantities: ``rows``; moment ``arms``; ``missing``: why a case has none; ``fits`` of laws to cubes."""
 
     rows: tuple[Row, ...]
     arms: tuple[ArmsBeside, ...]

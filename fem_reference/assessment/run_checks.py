@@ -98,9 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points, remaining overlap at
-    rest.
-    """
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and left from rest."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
