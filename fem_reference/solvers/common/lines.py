@@ -117,7 +117,7 @@ class Lines:
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
-    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle lacks what they need."""
+    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle lacks them."""
     fibres, evenly = problem.fibres, (np.arange(spread) + 0.5) / max(spread, 1)
     places = (0.0, *(via.at for via in vias), *evenly.tolist(), 1.0)
     named = [index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(vias)]

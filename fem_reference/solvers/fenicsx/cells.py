@@ -35,7 +35,7 @@ class Structure(NamedTuple):
 @dataclass
 class Tangent:
     """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of unknown
-    pressures. The last entry collects all that belong to prescribed unknowns.
+    pressures. The last entry collects everything that belongs to prescribed unknowns.
     """
 
     entries: Floats
@@ -90,8 +90,8 @@ class CellSums:
         self, residual: Floats, into: Tangent | None = None, moves: Floats | None = None, *, pointwise: bool = False
     ) -> None:
         """Add the forces of the cells to ``residual`` (n,) over this rank's unknowns, ghosts included. If a tangent is given, add
-        that of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if any.
-        ``pointwise``: the pressure follows the volume at every point and is no unknown of its own.
+        the tangent of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if
+        any. ``pointwise``: the pressure follows the volume at every point and is not an unknown.
         """
         given = self.form.derivatives.first if into is None else self.form.derivatives.second
         for some in self._chunks():
@@ -138,7 +138,7 @@ class CellSums:
         return found
 
     def stabilising_energy(self) -> float:
-        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements that need none."""
+        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements without stabilisation."""
         if self.projection is None:
             return 0.0
         values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]

@@ -18,7 +18,7 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
     """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,) that
-    carry them, and and of the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
+    carry them; for the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
     ``nodes`` (n, k, 3) [mm] and the unknowns ``dofs`` (n, k, 3).
     """
 

@@ -39,7 +39,7 @@ class Multigrid:
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` if this fails."""
         fresh = self.stale
         if fresh:
             self._renew()
@@ -123,7 +123,7 @@ class Multigrid:
         return self._matrix(csr_array(found)), fixed
 
     def _schur(self) -> PETSc.Mat:
-        """Minus the mass matrix of the pressure, divided by local stiffness, in place of the Schur complement."""
+        """Minus the mass matrix of the pressure, divided by local stiffness, instead of the Schur complement."""
         system, cells = self.system, self.system.cells
         blocks = cells.softness() * system.tangent.unit**2
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]

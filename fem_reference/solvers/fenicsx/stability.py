@@ -20,10 +20,11 @@ class Stability:
         self.pressures = space.sub(1).collapse()[0].dofmap.index_map.size_global if space.num_sub_spaces > 1 else 0
 
     def of_material(self) -> float:
-        """The number of negative modes that the material has for certain: those along which the energy falls even if the pressure
+        """The number of negative modes that the material certainly has: modes along which the energy falls even if the pressure
         follows the volume at every point. Pressures of an element control the volume on average only: shrinking in one place and
-        swelling in another costs nothing, and under a stress of several shear moduli the energy may fall in that way although the
-        material's own does not. The elements' displacements are a subset of the body's, so the body has at least this many modes.
+        swelling in another needs no energy, and under a stress of several shear moduli the energy may fall in such modes although
+        the energy of the material does not. The elements' displacements are a subset of the body's, so the body has at least this
+        many modes.
         """
         found = self.negative_modes(pointwise=self.pressures > 0)
         self.negative_modes()  # restores the tangent and its factors for the next solve
