@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from fem_reference.assessment.run_checks import BALANCE, ROUNDING, RunCheck
 from fem_reference.effects import region_of
-from fem_reference.foundations.mesh import Floats, corner_areas
-from fem_reference.problems.body import Body, Cells
+from fem_reference.foundations.mesh import Floats, TetMesh
+from fem_reference.geometry.quadratic import Displaced
+from fem_reference.problems.body import Body
 from fem_reference.runs.store import Frame, Run
 
 
@@ -56,29 +56,7 @@ def _load(body: Body, frame: float) -> Floats | None:
     acting, mesh = [one for one in body.effects if one.outer], body.mesh
     if acting and (mesh.kind != "tetrahedron" or mesh.degree > 1 or any(map(region_of, acting))):
         return None
-    found = [(one.amount(frame), one.resultant(_AtRest(mesh))) for one in acting]
+    rest = Displaced(TetMesh(mesh.points, mesh.cells, mesh.facets))  # the present positions are not known
+    found = [(one.amount(frame), one.resultant(rest)) for one in acting]
     forces = [amount * load.force for amount, load in found if load is not None]
     return None if len(forces) < len(acting) else np.sum([np.zeros(3), *forces], axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class _AtRest:
-    """The shape at rest of straight tetrahedra, as a :class:`fem_reference.foundations.loads.Shape`."""
-
-    mesh: Cells
-
-    def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """The volume [mm3] or an area [mm2]; the present positions are not known."""
-        if on is not None:
-            return float(corner_areas(self.mesh.points[self.mesh.facets[on]]).sum()), np.full(3, np.nan)
-        corners = self.mesh.points[self.mesh.cells]
-        volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-        return float(volumes.sum()), np.full(3, np.nan)
-
-    def facing(self, on: str) -> None:  # noqa: ARG002
-        """Nothing: the present shape is not known."""
-        return
-
-    def motion(self) -> None:
-        """Nothing: the velocity is not known."""
-        return

@@ -75,11 +75,6 @@ class Point:
         """The share of the machine that other processes kept busy during its run; NaN if that is not known."""
         return self.costs.get(LOAD, math.nan)
 
-    @property
-    def is_loaded(self) -> bool:
-        """True if its time was measured on a machine busy with other work."""
-        return self.load > LOADED
-
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
         """Its error and its cost, None if one is not known or not above zero."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)

@@ -136,6 +136,11 @@ def worst(checks: Iterable[RunCheck]) -> RunChecks:
     return tuple(found.values())
 
 
+@lru_cache(maxsize=8)
+def _areas(surface: Surface) -> Floats:
+    return vertex_areas(surface.points, surface.triangles)
+
+
 def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
     """The check at the point (n, 3) whose ``values`` (n,) [mm] are nearest to ``allowed`` (n,), or exceed it most."""
     i = int(np.argmax(values / allowed))
@@ -162,7 +167,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
-    weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
+    weights = _areas(problem.surface)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     at_rest = 0.0 if forces is None or in_situ.among(problem.effects) is None else float(forces[0])
     for i, number in enumerate(run.numbers):

@@ -39,6 +39,13 @@ def boxes_of(surface: Surface) -> Boxes:
     return Boxes(np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c))
 
 
+@lru_cache(maxsize=16)
+def bounds(surface: Surface) -> tuple[Floats, Floats]:
+    """The lowest and the highest coordinates (3,) [mm] of the points of a ``surface``."""
+    columns = np.ascontiguousarray(surface.points.T)  # along which numpy is ten times as fast
+    return columns.min(axis=1), columns.max(axis=1)
+
+
 def around(points: Floats, reach: Floats) -> Boxes:
     """Boxes that extend by ``reach`` (n,) [mm] from ``points`` (n, 3) in all directions."""
     return Boxes(points.T - reach, points.T + reach)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.boxes import around, boxes_of, reached
+from fem_reference.geometry.boxes import around, bounds, boxes_of, reached
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.rigid_bodies import Obstacle
@@ -70,14 +70,14 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     of_body, of_bone = (np.unique(side) for side in pairs.T)
 
     def into_bone(points: Floats) -> Floats:
-        return np.maximum(-shape.sample(points).distance, 0.0)
+        return np.maximum(-shape.distances(points), 0.0) if len(points) else np.zeros(0)
 
-    def into_body(points: Floats) -> Floats:
-        return depths_within(local, points, of_body)
+    def into_body(points: Floats) -> Floats:  # where the body is, whose boxes serve all bones
+        return depths_within(body, apply(pose, points), of_body)
 
     tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((local, of_body), (bone, of_bone)))
     first = _of_surface(local, of_body, into_bone, tips, into_bone(local.points[tips]) > 0)
-    second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(local, bone.points[bone_tips]))
+    second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(body, apply(pose, bone.points[bone_tips])))
     count = len(local.points) + len(local.triangles)
     joined = Depths(*(np.concatenate(arrays) for arrays in zip(first, (second[0] + count, *second[1:]), strict=True)))
     return replace(joined, places=apply(pose, joined.places))
@@ -114,7 +114,7 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def _in_box(body: Surface, points: Floats) -> Ints:
     """The indices (k,) of the ``points`` (n, 3) within the bounding box of a ``body``."""
-    low, high = body.points.min(axis=0), body.points.max(axis=0)
+    low, high = bounds(body) if len(points) else (points, points)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
 
 

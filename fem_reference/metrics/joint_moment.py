@@ -50,21 +50,16 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     return measures("joint_moment", dict(zip(STATISTICS, found, strict=True)))
 
 
-def force_arms(run: Run, joint: Joint) -> Floats:
-    """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN if there is none.
-
-    For a muscle that is a line between two bones, also around obstacles on them, the arm is ``-dl/dtheta``. For any other muscle it
-    is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
-    """
-    return np.asarray(_values(run, joint)[2])
-
-
 def _has_force(run: Run, joint: Joint) -> bool:
     return joint.bone.name in vector_names(run.scalars, "force_on_")
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment, force and arm by frame (3, f)."""
+    """Moment, force and arm by frame (3, f).
+
+    The arm of a muscle that is a line between two bones, around obstacles on these too, is ``-dl/dtheta``; that of any other, by
+    virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
+    """
     moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
     force = np.linalg.norm(run.force(joint.bone.name), axis=1)
     known = force > _LEAST * force.max(initial=0.0)

@@ -17,7 +17,7 @@ STATISTICS = {
         headline="{} deep in another muscle",
         curve="Depth to which the muscle and another one penetrate each other",
         shown={"curve": 52, "headline": 60},
-    ),
+    )
 }
 OF, AGAINST = "surface", "itself"
 

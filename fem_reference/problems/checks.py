@@ -11,7 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems import directions, friction, regions, tendons
+from fem_reference.problems import directions, friction, loaded, regions, tendons
 from fem_reference.problems.body import (
     Body,
     Cells,
@@ -232,12 +232,14 @@ def _check_needs(body: Body) -> None:
 
 def check_agreement(body: Body) -> None:
     """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
-    friction is combined with tension at rest, two regions of its surface prescribe different exact displacements at shared places,
-    or a path of motion cannot be followed. Displacements are compared at all frames, at all stops, and halfway between them.
+    friction is combined with tension at rest, a load is on a part that is prescribed exactly, two regions of its surface prescribe
+    different exact displacements at shared places, or a path of motion cannot be followed. Displacements are compared at all
+    frames, at all stops, and halfway between them.
     """
     regions.check(body)
     directions.check_normals(body)
     tendons.check(body)
+    loaded.check(body)
     friction.check(body.frictions, begun=body.begun)
     ends = np.unique([*body.frames, *body.stops])
     sampled = np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))

@@ -45,13 +45,7 @@ from fem_reference.problems import regions
 from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
-from fem_reference.problems.contact import (
-    ContactBone,
-    ContactLaw,
-    check_bone,
-    check_exempt,
-    nearest_at_rest,
-)
+from fem_reference.problems.contact import ContactBone, ContactLaw, check_bone, check_exempt, nearest_at_rest
 from fem_reference.problems.fibre_ends import attached_ends, completed, facts_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest

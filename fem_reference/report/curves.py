@@ -12,15 +12,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, described, find
 from fem_reference.metrics.moment_arm import turning
-from fem_reference.report.drawings import (
-    BAND,
-    NOT_A_NUMBER,
-    REFERENCE,
-    Drawing,
-    looks,
-    over_frames,
-    plain_numbers,
-)
+from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, looks, over_frames, plain_numbers
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 

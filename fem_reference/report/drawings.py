@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -44,21 +45,7 @@ _OURS = (
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # nearly black, as matplotlib omits pure black from SVG
-LOOK: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "fem_reference",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#888888",
-    "axes.grid": True,
-    "grid.color": "#e8e8e8",
-    "xtick.color": "#444444",
-    "ytick.color": "#444444",
-    "legend.frameon": False,
-}
+LOOK: Any = dict(mpl.rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False))
 # Names in style.css of colours that change on dark pages.
 _NAMED = {
     "#e8e8e8": "grid",

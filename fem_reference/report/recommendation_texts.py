@@ -53,7 +53,7 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
             f"including margins: {number(margins.error)} times the error, {number(margins.time)} times the time"
         )
     if warning := under_load(found.loads, LOADED):
-        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""
+        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.load > LOADED else ""
         lines.append(f"{warning}{own}")
     return "\n".join(lines)
 

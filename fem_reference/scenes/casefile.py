@@ -166,28 +166,17 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     kind: type[Record]
     record, kind = (ScalarCase, FieldEffect) if "domain" in table else (MuscleCase, Effect)
     if isinstance(table.get("muscle"), list):
-        record, table = MusclesCase, table | {"muscle": _muscles(table["muscle"], place)}
+        several = [with_effects(one, join(place, f"muscle[{i}]")) for i, one in enumerate(table["muscle"])]
+        record, table = MusclesCase, table | {"muscle": several}
     for key in whose:
         if key in table:
             raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
-    if "effect" in table:
-        table = table | {"effect": effects(table["effect"], place, kind)}
-    case: Case = parse(record, table | whose, place)
+    case: Case = parse(record, with_effects(table, place, kind) | whose, place)
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     check_once(runs, join(place, "candidate"))
     case.check_solvers()
     check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     return _checked(case)
-
-
-def _muscles(entries: list[Any], place: str) -> list[Any]:
-    """The entries below the key ``muscle``, with the effects of each as records."""
-    return [
-        entry | {"effect": effects(entry["effect"], join(place, f"muscle[{i}]"))}
-        if isinstance(entry, dict) and "effect" in entry
-        else entry
-        for i, entry in enumerate(entries)
-    ]
 
 
 def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
@@ -207,14 +196,15 @@ def _checked[C: Case](case: C) -> C:
     return case
 
 
-def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The effects of a ``kind`` below the key ``effect``, each once; a value that is not a list is returned unchanged."""
+def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
+    """The ``table`` with the effects of a ``kind`` below its key ``effect`` as records, each once; unchanged without a list."""
+    entries = table.get("effect") if isinstance(table, dict) else None
     if not isinstance(entries, list | tuple):
-        return entries
+        return table
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
     names = [entry["name"] for entry in entries]
     _check_effects(names, found, place)
-    return found
+    return table | {"effect": found}
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:

@@ -1,7 +1,7 @@
 """The case of several muscles, which share bones, frames and a reference, as frozen records; and each muscle as a case."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -127,6 +127,28 @@ class MusclesCase(DrivenCase):
             made |= {"effect": (*everywhere, *muscle.effect), "place": join(self.place, f"muscle[{i}]")}
             found.append(MuscleCase.model_construct(None, **made))
         return tuple(found)
+
+
+def muscles_of(case: DrivenCase) -> tuple[Muscle, ...]:
+    """The muscle of a case, or each of several."""
+    return case.muscle if isinstance(case.muscle, tuple) else (case.muscle,)
+
+
+def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str, object]]) -> C:
+    """The case with the keys that ``change`` returns for its muscle, or for each of several."""
+    changed = [one.model_copy(update=change(one)) for one in muscles_of(case)]
+    return case.model_copy(update={"muscle": tuple(changed) if isinstance(case.muscle, tuple) else changed[0]})
+
+
+def exactly_attached[C: DrivenCase](case: C) -> C:
+    """The case with exact attachments in place of springs."""
+
+    def exact(one: DrivenCase | Muscle) -> dict[str, object]:
+        if not isinstance(one, MuscleCase | MuscleOfSeveral):
+            return {}
+        return {"attachment": tuple(entry.model_copy(update={"stiffness": None}) for entry in one.attachment)}
+
+    return with_muscles(case, exact).model_copy(update=exact(case))
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.scenes.muscles import MusclesCase
+from fem_reference.scenes.muscles import MusclesCase, muscles_of, with_muscles
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.variations import by_springs, muscles_of, on_larger, with_muscles
+from fem_reference.studies.variations import by_springs, on_larger
 
 log = logging.getLogger(__name__)
 

@@ -26,11 +26,11 @@ from fem_reference.problems.finer import finer as on_finer_cells
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import DrivenCase, MuscleCase
+from fem_reference.scenes.muscles import exactly_attached
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.variations import (
     by_springs,
-    exactly_attached,
     on_larger,
     on_tetrahedra,
     with_contact,

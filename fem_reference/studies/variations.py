@@ -1,7 +1,7 @@
 """Variations of a case: single changes, and the ladders of a study, which vary one setting at a time."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,8 @@ from fem_reference.io import files
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.scenes.muscle import DrivenCase, Muscle, MuscleCase, VertexList
-from fem_reference.scenes.muscles import MuscleOfSeveral
+from fem_reference.scenes.muscle import DrivenCase, MuscleCase, VertexList
+from fem_reference.scenes.muscles import with_muscles
 
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 # Sizes of tetrahedra relative to the case's, each with every number of refinements up to the case's own.
@@ -32,17 +32,6 @@ _SIZES = (2.0, 1.6, 1.25, 1.0)
 _COARSER = 1.6
 _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
-
-
-def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], dict[str, Any]]) -> C:
-    """The case with the keys that ``change`` returns for its muscle, or for each of several."""
-    changed = [one.model_copy(update=change(one)) for one in muscles_of(case)]
-    return case.model_copy(update={"muscle": tuple(changed) if isinstance(case.muscle, tuple) else changed[0]})
-
-
-def muscles_of(case: DrivenCase) -> tuple[Muscle, ...]:
-    """The muscle of a case, or each of several."""
-    return case.muscle if isinstance(case.muscle, tuple) else (case.muscle,)
 
 
 def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
@@ -64,17 +53,6 @@ def with_contact[C: DrivenCase](case: C, kind: type[Effect] = Contact, **changes
 def by_springs(case: MuscleCase) -> bool:
     """True where an attachment is by springs."""
     return any(entry.stiffness is not None for entry in case.attachment)
-
-
-def exactly_attached[C: DrivenCase](case: C) -> C:
-    """The case with exact attachments in place of springs."""
-
-    def exact(one: MuscleCase | MuscleOfSeveral) -> dict[str, Any]:
-        return {"attachment": tuple(entry.model_copy(update={"stiffness": None}) for entry in one.attachment)}
-
-    if isinstance(case, MuscleCase):
-        return case.model_copy(update=exact(case))
-    return with_muscles(case, lambda one: exact(one) if isinstance(one, MuscleOfSeveral) else {})
 
 
 def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:

@@ -23,6 +23,8 @@ from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
 
+# The time [s] within which a signal to all processes reaches this one, after one of a lab has ended by it.
+_HEARD = 0.5
 # Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
 
@@ -73,17 +75,21 @@ def run(
     """The results of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
     negative control.
 
-    Two run at a time where there are two cores, each thread with a lab of its own. The labs are closed even after an error.
+    Two run at a time where there are two cores, each thread with a lab of its own. The labs are closed even after an error. Entries
+    that an interrupt or an error ends with their labs have no result.
     """
+    ended = threading.Event()
     begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)
     free = SimpleQueue[Lab]()
 
     def work(entry: Entry) -> Result:
         lab = free.get()
         last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
+        passed = time.perf_counter() - begin
         free.put(lab)
-        with reporting:
-            _log_progress(last, next(done), len(wanted), time.perf_counter() - begin)
+        if last.word == "pass" or not ended.wait(_HEARD):
+            with reporting:
+                _log_progress(last, next(done), len(wanted), passed)
         return last
 
     labs = min(2, len(os.sched_getaffinity(0)), len(wanted))
@@ -92,6 +98,7 @@ def run(
             free.put(stack.enter_context(make_lab()))
         found = [pool.submit(work, entry) for entry in wanted]
         stack.callback(lambda: [one.cancel() for one in found])  # no thread goes on to the next while the labs close
+        stack.callback(ended.set)
         for one in wait(found, return_when=FIRST_EXCEPTION).done:
             one.result()
     return tuple(one.result() for one in found)

@@ -6,7 +6,7 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.boxes import Boxes, around, boxes_of, touching
+from fem_reference.geometry.boxes import Boxes, around, bounds, boxes_of, touching
 
 
 def scattered(seed: int, count: int, size: float) -> Boxes:
@@ -56,6 +56,10 @@ def test_nothing_touches_nothing() -> None:
 
 def test_a_triangle_and_a_point_fill_their_boxes() -> None:
     surface = Surface(np.array([[0.0, 5, 2], [1, 4, 2], [-1, 6, 7]]), np.array([[0, 1, 2]]))
+    assert_array_equal(bounds(surface), [[-1, 4, 2], [1, 6, 7]])
+    assert_array_equal(
+        bounds(surface.moved_to(surface.points + 9)), [[8, 13, 11], [10, 15, 16]]
+    )  # not those of earlier points
     assert_array_equal(boxes_of(surface).low.T, [[-1, 4, 2]])
     assert_array_equal(boxes_of(surface).high.T, [[1, 6, 7]])
     found = around(surface.points, np.array([1.0, 2.0, 0.5]))

@@ -18,7 +18,6 @@ from fem_reference.foundations.motion import RigidMotion
 from fem_reference.io import files
 from fem_reference.metrics import MeasurementContext, at_rest, change, context_of, find, measure
 from fem_reference.metrics.fibre_length import both_lengths
-from fem_reference.metrics.joint_moment import force_arms
 from fem_reference.metrics.moment_arm import excursion_arms
 from fem_reference.problems.of_case import setup
 from fem_reference.problems.setup import Bone, Joint
@@ -218,6 +217,13 @@ def test_forces_on_all_bones_balance(bar: tuple[Run, MeasurementContext]) -> Non
 def test_a_case_without_a_joint_has_no_moment() -> None:
     run = pulled()
     assert measure(run, at_rest(run), replace(context(run), joints=()), ["joint_moment"]) == ()
+
+
+def force_arms(run: Run, joint: Joint) -> Floats:
+    """The arm (f,) [mm] of the force on the bone of a joint, as the metric measures it from rest at every frame."""
+    name = joint.bone.name
+    force = np.linalg.norm(run.force(name), axis=1)
+    return run.moment(name, joint.centre) @ joint.axis / np.where(force > 0, force, np.nan)
 
 
 def test_the_force_arm_of_a_straight_bar_is_its_excursion_arm() -> None:

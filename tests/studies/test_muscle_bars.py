@@ -16,10 +16,10 @@ from fem_reference.io import files
 from fem_reference.report import pages
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
+from fem_reference.scenes.muscles import exactly_attached
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import muscle_bars, refinement
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.variations import exactly_attached
 
 pytestmark = pytest.mark.slow
 

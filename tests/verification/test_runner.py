@@ -2,6 +2,9 @@
 
 import logging
 import math
+import os
+import signal
+import sys
 import threading
 import time
 from contextlib import contextmanager
@@ -161,6 +164,34 @@ def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch
     with pytest.raises(TypeError, match="ours"):
         runner.run([entry("slow", slow), raising(TypeError("ours")), *later], make_lab)
     assert measured == ["slow"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_the_command_judges_no_entry(number, caplog, monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(2)))
+    before = signal.signal(number, lambda *_: sys.exit(130))
+    struck, measured = threading.Event(), []
+
+    def dies(_):  # the processes of labs end by the signal that ends the command, one of them before it is heard here
+        struck.set()
+        raise RuntimeError("the process of FEniCSx ended with exit status -2")
+
+    def dies_first(lab):
+        threading.Timer(0.05, lambda: os.kill(os.getpid(), number)).start()
+        return dies(lab)
+
+    def dies_later(lab):
+        assert struck.wait(5)
+        time.sleep(0.2)
+        return dies(lab)
+
+    later = [entry(f"later_{i}", lambda _: measured.append("later")) for i in range(3)]
+    try:
+        with caplog.at_level(logging.INFO, "fem_reference"), pytest.raises(SystemExit) as ended:
+            runner.run([entry("first", dies_first), entry("second", dies_later), *later], Labs())
+    finally:
+        signal.signal(number, before)
+    assert (ended.value.code, measured, caplog.messages) == (130, [], [])
 
 
 def test_a_lab_that_cannot_be_made_closes_the_others(monkeypatch) -> None:

@@ -167,19 +167,12 @@ def _strain(force: float) -> float:
     return _TOE_STRAIN + (force - _TOE) / (1 - _TOE) * (_TENDON_STRAIN - _TOE_STRAIN)
 
 
-def hyperbola(velocity: float, curvature: float) -> float:
-    """The force, as a share of the isometric force, at a ``velocity`` of shortening as a share of the greatest: (5.1) solved for F.
-    In lengthening (negative) it rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003).
-    """
-    if velocity >= 0:
-        return (1 - velocity) / (1 + velocity / curvature)
-    rise = _LENGTHENING - 1
-    slope = 2 * (1 + 1 / curvature)
-    return 1 + rise * slope * -velocity / (rise + slope * -velocity)
-
-
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The velocity of shortening, as a share of the greatest, at a ``force``; tangents continue the hyperbola beyond its ends."""
+    """The velocity of shortening, as a share of the greatest, at a ``force``, a share of the isometric force: (5.1) solved for v.
+
+    In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both curves
+    beyond their ends.
+    """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load
         return 1 - force * (1 + 1 / curvature)

@@ -232,10 +232,10 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
     for key in whose:
         if key in table:
             raise InputError(join(where, key), "an unknown key", f"one of {', '.join(keys(Hard))}")
-    if "effect" in table:
-        table = table | {"effect": casefile.effects(table["effect"], where)}
+    table = casefile.with_effects(table, where)
     if isinstance(several := table.get("beside"), list):
-        table = table | {"beside": [_with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]}
+        others = [casefile.with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]
+        table = table | {"beside": others}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
         want = 'nothing beside "no_solution", as no run should reach its end'
@@ -255,13 +255,6 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
         raise InputError(join(where, "steps.until"), hard.steps.until, want)
     return hard
-
-
-def _with_effects(one: Any, where: str) -> Any:
-    """A body ``beside`` the block, with the effects that its table names."""
-    return (
-        one | {"effect": casefile.effects(one["effect"], where)} if isinstance(one, dict) and "effect" in one else one
-    )
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:

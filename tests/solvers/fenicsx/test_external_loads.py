@@ -24,7 +24,7 @@ LOADS = {
     "gravity": effects.make("gravity", density="1060 kg/m3", acceleration="3, 0, -9.81 m/s^2", ramp=RAMP),
     "traction": effects.make("traction", on="free", force="0.1, 0.2, 0.3 kPa", ramp=RAMP),
     "pressure": effects.make("pressure", on="free", pressure="2 kPa", ramp=RAMP),
-    "pressure on what is attached": effects.make("pressure", on="top", pressure="1 kPa", ramp=RAMP),
+    "pressure on springs": effects.make("pressure", on="bottom", pressure="1 kPa", ramp=RAMP),
     "damping": effects.make("damping", coefficient="200 Pa s/mm^2"),
 }
 BALANCES = {f"{kind}s that bones do not carry" for kind in ("force", "moment")}
@@ -55,8 +55,10 @@ def balances(problem: MuscleProblem, run: Run) -> dict[str, RunCheck]:
     return {one.name: one for one in of_muscle(problem, run) if one.name in BALANCES}
 
 
-@pytest.mark.parametrize("name", LOADS)
-@pytest.mark.parametrize("springs", [False, True])
+@pytest.mark.parametrize(
+    ("name", "springs"),
+    [(name, springs) for name in LOADS for springs in (False, True) if springs or "springs" not in name],
+)
 def test_bones_carry_a_load_and_its_moment(name, springs) -> None:
     # The loads are of the order of 0.01 to 5 N and 1 to 100 N mm.
     problem = bar(name, springs=springs)
