@@ -68,7 +68,7 @@ def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
-    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and one outside it."""
+    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and a facet outside."""
     found = np.zeros(len(mesh.points), bool)
     for name in rims:
         faces = mesh.facets[name]
@@ -98,7 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, those of the boundary moved onto the surface at its volume, as far as the tets around them remain valid."""
+    """The ``points``, with boundary points moved onto the surface at its volume as far as the tets around them remain valid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

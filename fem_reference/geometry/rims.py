@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: its triangles end at the rim."""
+"""Rims of attachments as edges of a coarse surface: triangles end at the rim."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,8 @@ Bools = NDArray[np.bool_]
 
 # Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1
-# A vertex closer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers remain.
+# A vertex closer to a crossing than this share of the edge moves to the crossing. Above 0.35 triangles degenerate, below 0.25
+# slivers remain.
 _NEAR = 0.3
 # A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
 _THERE = 0.2
