@@ -126,7 +126,7 @@ def out(options: argparse.Namespace) -> Path:
 
 
 def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
-    """Print ``text``, and write ``facts`` as JSON if ``--json`` asks for it."""
+    """Print ``text``; with ``--json`` also write ``facts`` as JSON."""
     print(text)
     _explain(text, options)
     if options.json is not None:
@@ -134,7 +134,7 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
 
 
 def write(path: Path | None, text: str) -> None:
-    """Write ``text`` to ``path``, if there is one, in a folder that is made where it does not exist."""
+    """Write ``text`` to ``path``, if given, in a folder that is created if necessary."""
     if path is not None:
         from fem_reference.io import files
 

@@ -70,7 +70,7 @@ _SHARED: dict[str, dict[str, Any]] = {
 
 
 def share(parser: argparse.ArgumentParser, *names: str) -> None:
-    """Add those options, by name, that several verbs share."""
+    """Add options that several verbs share, by name."""
     for name in names:
         parser.add_argument(name, **_SHARED[name])
 
@@ -86,7 +86,7 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line; with ``only`` it imports that verb alone, as loading all of them takes seconds."""
+    """The parser of the whole command line; with ``only`` it imports this verb alone, as loading all verbs takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
@@ -103,7 +103,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
-    """Add the options of a verb, and those that all verbs have."""
+    """Add the options of a verb, and the options of all verbs."""
     sub.register("action", None, _Given)
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False)
     sub.set_defaults(limit=[], writes=True, page_name=None)

@@ -1,4 +1,4 @@
-"""The verb ``compare``: candidates against the reference, or one of them against its earlier version."""
+"""The verb ``compare``: candidates against the reference, or a candidate against its earlier version."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The verb ``standings``: one page on which our solvers, other people's programs and submitted frames stand, over cases."""
+"""The verb ``standings``: our solvers, other people's programs and submitted frames over cases, on one page."""
 
 import argparse
 from pathlib import Path

@@ -32,7 +32,7 @@ class Parts:
 
     @property
     def surface(self) -> Surface:
-        """The surface that all parts form."""
+        """The surface of all parts together."""
         return Surface(self.points, self.triangles)
 
     def area(self, label: int) -> float:
@@ -120,7 +120,7 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True if ``goes`` may move onto ``stays``: the surface stays manifold, edges sharp, no triangle flips or is the flattest."""
+    """True if ``goes`` may move onto ``stays``: surface manifold, edges sharp, no triangle flipped or flatter than the flattest."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
     if len(here & there) != 4 or len(here | there) < 6:  # two ends and two common neighbours; more than a tetrahedron
