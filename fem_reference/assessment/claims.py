@@ -59,7 +59,7 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of the ``bars`` of a reference, each with the difference of its measures from those of a ``finer`` solution."""
+    """The claims of the ``bars`` of a reference, each with the difference of its measures from a ``finer`` solution."""
     found = []
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)

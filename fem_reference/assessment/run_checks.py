@@ -34,7 +34,7 @@ _SPRINGS = 1.5
 _TURN = 1.01 * math.pi / 2
 # Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Self-contact of a part allows a penetration of less than this share of the spacing, whatever pressure is recorded.
+# Self-contact of a part allows a penetration of less than this share of the spacing, for any recorded pressure.
 _OWN = 0.5
 # A bone that penetrates by more than this share of half its thickness has broken through contact, for any stiffness.
 _GIVEN_WAY = 0.75

@@ -68,7 +68,7 @@ def _explain(message: str, options: argparse.Namespace) -> None:
 
 
 def _why_broken(error: BaseException) -> str:
-    """The message for an unexpected exception: its text, its place, and what to do."""
+    """The message for an unexpected exception: its text, its place, and a remedy."""
     if isinstance(error, MemoryError):
         return "not enough memory; nothing was judged. Smaller input, or larger tetrahedra, need less"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):

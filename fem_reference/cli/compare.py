@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure the one candidate and its earlier version, and write the page of changes."""
+    """Measure a candidate and its earlier version, and write the page of changes."""
     scene = casefile.muscle(case, "--against")
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")

@@ -40,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure what is new or changed, and write the page."""
+    """Measure new and changed rows, and write the page."""
     limit = _time(options.time_limit)
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:

@@ -56,7 +56,7 @@ def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
 
 
 def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
-    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; its own inverse."""
+    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; a second inversion restores them."""
     away = points - pole
     return np.asarray(pole + away * radius**2 / np.sum(away**2, axis=1, keepdims=True))
 
@@ -82,7 +82,7 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """The sums (n, 3, 3) over the triangles around each point of their angle at it times ``n n^T``, with their unit normal n."""
+    """For each point, the sum (n, 3, 3) over the triangles around it of angle times ``n n^T``, with the unit normal n."""
     across = unit_normals(points[triangles])
     squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))

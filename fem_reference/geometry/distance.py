@@ -85,7 +85,7 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def flattened(surface: Surface, place: Floats) -> float:
     """The error of a flat triangle on a curved surface times the radius of curvature [mm2]: its middle's distance from a sphere
-    through its corners, times the radius of the sphere. The triangle is the one nearest to a ``place`` (3,) [mm].
+    through its corners, times the radius of the sphere. The triangle is the nearest to a ``place`` (3,) [mm].
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6

@@ -242,7 +242,7 @@ def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
 
 
 def _on(surface: Surface) -> Floats:
-    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer ones: (n, 3) [mm]."""
+    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer edges: (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -1,4 +1,4 @@
-"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
+"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written completely or not at all.
 
 A reader keeps the order and the number of the points and, if the file has it, their double precision.
 """

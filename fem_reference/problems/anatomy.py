@@ -196,7 +196,7 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 
 def _turning(case: MuscleCase) -> Floats:
-    """The matrix (3, 3) from the directions of the lines to those of the material."""
+    """The matrix (3, 3) from the directions of the lines to the directions in the material."""
     if (turned := case.fibres.turned) is None:
         return np.eye(3)
     return RigidMotion(turned.axis, (0.0, 0.0, 0.0), (0.0,), (turned.angle,)).pose(0.0)[:3, :3]

@@ -131,7 +131,7 @@ def turn(rest: Setup, frame: float) -> float:
 
 
 def length_of(rest: Setup) -> float:
-    """The length [mm] from the first attachment to the last, or of the whole muscle without two attachments."""
+    """The length [mm] from the first attachment to the last, or of the entire muscle without two attachments."""
     middles = centres(rest) or [np.zeros(3)]
     return float(np.linalg.norm(middles[0] - middles[-1])) or diagonal(rest.surface.points)
 

@@ -25,7 +25,7 @@ NONE: Shares = MappingProxyType({})
 
 # The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit into a cache.
 _MOST, AT_ONCE = 2048, 1024
-_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved ones may be inverted between their corners
+_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may be inverted between their corners
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:

@@ -1,4 +1,6 @@
-"""Frames and runs of one of several muscles, taken from the common ones. Scalars of a muscle begin with its name and a dot."""
+"""Frames and runs of one of several muscles, taken from the frames and runs of all. Scalars of a muscle begin with its name and a
+dot.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace

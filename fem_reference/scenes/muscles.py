@@ -59,7 +59,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by their names; the name of an effect on one muscle follows that of the muscle."""
+        """The effects by their names; the name of an effect on one muscle follows the name of the muscle."""
         own = {f"{muscle.name}: {one.title}": one for muscle in self.muscle for one in muscle.effect}
         return {one.title: one for one in self.effect} | own
 
@@ -141,7 +141,7 @@ def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str,
 
 
 def exactly_attached[C: DrivenCase](case: C) -> C:
-    """The case with exact attachments in place of springs."""
+    """The case with exact attachments instead of springs."""
 
     def exact(one: DrivenCase | Muscle) -> dict[str, object]:
         if not isinstance(one, MuscleCase | MuscleOfSeveral):

@@ -88,7 +88,7 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 
 @compiled
 def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
-    """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to those of ``points``.
+    """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to the edges of ``points``.
 
     The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges start at the vertex itself, as in Sorkine and
     Alexa 2007; with the centroids of the report's text the fit would no longer minimise eq. 5.10.

@@ -61,7 +61,7 @@ def can_keep(folder: Path) -> bool:
 def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
-    A compiled function contains those that it calls. numba checks only a function's own file for changes,
+    A compiled function contains the functions that it calls. numba checks only a function's own file for changes,
     so each version of all loops together has a folder.
     """
     digest = hashlib.sha256()

@@ -126,7 +126,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
 
 
 def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
-    """The lengths (k,) [mm] of lines from those of their parts."""
+    """The lengths (k,) [mm] of lines from the lengths of their parts."""
     return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
 
 

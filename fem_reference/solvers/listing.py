@@ -1,4 +1,4 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): what they compute, even where the report's text differs.
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even if the report's text differs.
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
 listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the directions
@@ -119,8 +119,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
     """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
 
-    Their columns go to the right side; then their rows and columns become those of the unit matrix. A vertex that is named twice
-    is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
+    Their columns go to the right side; then their rows and columns become rows and columns of the unit matrix. A vertex that is
+    named twice is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):

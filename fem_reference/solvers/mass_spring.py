@@ -94,7 +94,7 @@ def report_damping(mass: float, stiffness: float) -> float:
 
 
 def stable_time_step(network: Network, fixed: Ints) -> float:
-    """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
+    """The time step [s] below which eqs 5.6 and 5.7 are stable, for any shape.
 
     A mode of the free masses is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i with
     n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring; the least limit of all masses counts. The
@@ -152,7 +152,7 @@ class MassSpringModel:
         self.cost["time_steps"] += self.steps
 
     def carried(self, number: int) -> Floats:
-        """The positions (n, 3) [mm] of free masses at rest and of attached ones at frame ``number``."""
+        """The positions (n, 3) [mm] of free masses at rest and of attached masses at frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])

@@ -234,7 +234,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), with any of their corners first."""
+    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), for any first corner."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]

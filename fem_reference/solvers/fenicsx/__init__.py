@@ -241,7 +241,7 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 
 
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
-    """The settings with open ones filled in from the size of the problem and the machine."""
+    """The settings, with open values filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
     check_element(
         settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"

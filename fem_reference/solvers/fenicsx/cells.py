@@ -44,8 +44,8 @@ class Tangent:
 
 
 class CellSums:
-    """Sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, the displacement component by component, then the
-    pressures; ``structure``: the sparsity of the tangent.
+    """Sums over this rank's own cells. ``unknowns`` (m, u): by cell, the displacement component by component, then the pressures;
+    ``structure``: the sparsity of the tangent.
     """
 
     def __init__(self, form: Form) -> None:
@@ -184,8 +184,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The
-    stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
+    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second derivatives, (...,
+    v). The stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others

@@ -24,7 +24,7 @@ from ufl.domain import extract_domains
 from fem_reference.foundations import native
 
 # All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that no number is NaN, which here
-# marks a state without a value, and it makes the whole process round denormal numbers to zero.
+# marks a state without a value, and it makes the process round denormal numbers to zero.
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
 FLAGS += ["-fassociative-math", "-freciprocal-math"]
 # FFCx stores compiled forms under a hash of their content and these options, which include the kind of machine.

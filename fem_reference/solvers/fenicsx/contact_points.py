@@ -64,7 +64,7 @@ class Carried:
 
 
 def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points of a rule of ``degree`` on those of the ``facets`` that belong to this rank's own cells."""
+    """The quadrature points of a rule of ``degree`` on the ``facets`` that belong to this rank's own cells."""
     kind, msh = basix.CellType[mesh.kind], displacement.space.mesh
     sides = _sides(msh.topology, facets)
     side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral

@@ -78,7 +78,7 @@ class Factorised:
 
     @property
     def fresh(self) -> bool:
-        """True if the factors are those of the present matrix."""
+        """True if the factors belong to the present matrix."""
         return self.factorised == self.matrix.stateGet()
 
     def solve_exactly(self) -> bool:

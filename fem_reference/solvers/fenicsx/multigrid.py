@@ -109,7 +109,7 @@ class Multigrid:
 
     def _interpolation(self, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
         """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the fixed
-        unknowns of the linear element: those at corners where the quadratic element's is fixed.
+        unknowns of the linear element: at corners where the unknown of the quadratic element is fixed.
         """
         space, parents = self.system.unknowns.function_space.sub(0).collapse()
         corners = interpolation_matrix(fem.functionspace(space.mesh, ("Lagrange", 1, (3,))), space)

@@ -104,7 +104,7 @@ def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]
         (start, first), (end, last) = states
         return [((first + last) / 2, end - start)]
     (start, first), (between, middle), (end, last) = states
-    bend = 4 * between - start - end  # the rates at the ends, times the whole time, are bend - 2 start and 2 end - bend
+    bend = 4 * between - start - end  # the rates at the ends, times the total time, are bend - 2 start and 2 end - bend
     return [(first / 6, bend - 2 * start), (4 * middle / 6, end - start), (last / 6, 2 * end - bend)]
 
 

@@ -23,7 +23,7 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less than this share of its rest volume has collapsed, whatever the laws' ranges: about four fifths of muscle are
+# A cell with less than this share of its rest volume has collapsed, for any ranges of laws: about four fifths of muscle are
 # water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
 # and a fifth of the volume would barely contain the solid part. A body has collapsed if such cells are more than this share of it
 # at rest; at a rim their share decreases with the size of cells.
