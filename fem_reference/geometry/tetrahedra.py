@@ -185,7 +185,7 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError if nothing is left, a tet is flat, or the volume of the tets is not close to the volume in ``surface``. Their boundary
+    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. Their boundary
     is closed, as no triangle belongs to more than two of them.
     """
     if len(mesh.tets) == 0:

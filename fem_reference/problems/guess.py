@@ -46,8 +46,8 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, each the root
-    mean square over its points and per frame number. A jump is a change of velocity much greater than usual.
+    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, per frame number;
+    each is a root mean square over its points. A jump is a change of velocity much greater than usual.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
