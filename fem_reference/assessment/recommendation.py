@@ -41,7 +41,7 @@ class Expected:
         return max(self.error - self.bar, self.bar)
 
     def misses(self, limits: Mapping[str, float]) -> float:
-        """The greater ratio of its error or time to the ``limits``."""
+        """The greater of the ratios of error and time to their ``limits``."""
         own = {"error": self.error, "time": self.time}
         return max(own[name] / limit for name, limit in limits.items())
 

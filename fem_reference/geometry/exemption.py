@@ -37,8 +37,8 @@ class Exemption:
     """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each with the
     index ``by`` (r,) of its attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
 
-    The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached area.
-    The reach depends on the size of the surface and not on its triangles.
+    The reach is the ``spacing`` of the contact points: the area around a point closer to the attached part would include attached
+    area. The reach depends on the size of the surface and not on its triangles.
     """
 
     surface: Surface
@@ -99,7 +99,7 @@ class Exemption:
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
-        """Mask (n,) of the exempt vertices: exempt in any triangle around them."""
+        """Mask (n,) of the vertices that are exempt in any triangle around them."""
         return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
 
     @cached_property

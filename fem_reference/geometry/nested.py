@@ -98,7 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, with boundary points moved onto the surface at constant volume, as far as the tets around them remain valid."""
+    """The ``points``, with boundary points moved onto the surface at constant volume, as far as the tets around them stay valid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

@@ -41,7 +41,7 @@ class Clock:
             self._set(unknowns, self._seconds(frame - self.at))
 
     def settle(self, frame: float, unknowns: Floats) -> None:
-        """Record the load step to ``frame``, which ends with ``unknowns``, as the last good one."""
+        """Record the load step to ``frame``, which ends with ``unknowns``, as the last good step."""
         self.at = frame
         if self.step is not None and self.step.velocity is not None and frame > self.first:
             moved = (self.step.before.x.array, self.velocity, self.acceleration, unknowns)

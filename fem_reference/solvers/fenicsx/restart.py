@@ -1,4 +1,4 @@
-"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have.
+"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writing process would have.
 
 <run>/restart/frame_0010.npz   the unknowns and the arrays of the clock, (n,) in the order of the body's cells; ``facts``, in JSON
 """
@@ -91,7 +91,7 @@ class Restart:
         return mine, facts
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
-        """Take up the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
+        """Restore the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
             arrays, facts = self._read(frame)
