@@ -104,7 +104,7 @@ def check_names(names: list[str]) -> None:
     """InputError if two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
-            raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
+            raise InputError("--candidate", '"reference"', "another name: candidates are measured against this run")
         if names.count(name) > 1:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 

@@ -45,7 +45,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact where bones press",
+        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact if bones press",
     },
     "--negative-control": {
         "action": "store_true",
@@ -54,12 +54,12 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--name": {
         "dest": "page_name",
         "metavar": "NAME",
-        "help": "name of the page (default: the case with what makes the page different, such as CASE-KEY=VALUE)",
+        "help": "name of the page (default: the case with its changes, such as CASE-KEY=VALUE)",
     },
     "--ranks": {
         "type": positive,
         "metavar": "N",
-        "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
+        "help": "MPI processes of the reference (default: 1, or 2 for large bodies if cores are free)",
     },
     "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of runs made at once (default: 1)"},
     "--scheduler": {

@@ -14,7 +14,7 @@ from fem_reference.report.asked import Asked
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import standings
 
-HELP = "write the page on which our solvers and other people's stand, over cases; what did not change is not run again"
+HELP = "write the page of standings: our solvers and other people's, over cases; unchanged rows are not measured again"
 PAGE = "standings"
 
 

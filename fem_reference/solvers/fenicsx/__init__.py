@@ -77,7 +77,7 @@ def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -
     there = kept(cut_off, problem.body)
     again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
     if there.frames:
-        log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
+        log.info("begun before; continuing from the stored frames up to %d", there.frames[-1])
 
     def pass_on(frame: Frame) -> None:
         sink(frame)
