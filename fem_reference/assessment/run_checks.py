@@ -34,7 +34,7 @@ _SPRINGS = 1.5
 _TURN = 1.01 * math.pi / 2
 # Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Self-contact of a part allows a penetration of less than this share of the spacing, whatever pressure is recorded.
+# Self-contact of a part allows a penetration of less than this share of the spacing, for any recorded pressure.
 _OWN = 0.5
 # A bone that penetrates by more than this share of half its thickness has broken through contact, for any stiffness.
 _GIVEN_WAY = 0.75
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap of points, and what rest leaves."""
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and left from rest."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0

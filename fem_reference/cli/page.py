@@ -74,7 +74,7 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # an error where a case that the user named lacks its data
+        Bench(scenes[name], out(options)).setup()  # an error if a case that the user named lacks its data
     own = _cases.own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -115,7 +115,7 @@ def _estimation(options: argparse.Namespace) -> int:
 
 
 def _credibility(options: argparse.Namespace) -> int:
-    """Write the page of the evidence for each quantity, with moment arms where the anatomy is installed."""
+    """Write the page of the evidence for each quantity, with moment arms if the anatomy is installed."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
     entries = runner.entries().values()
@@ -140,7 +140,7 @@ _PAGES: dict[str, tuple[tuple[str, ...], Callable[[argparse.Namespace], int]]] =
 
 
 def _scenes(options: argparse.Namespace, names: Iterable[str]) -> list[MuscleCase]:
-    """The cases that are asked for, else those of ``names``."""
+    """The requested cases, else the cases ``names``."""
     return [_cases.muscle_case(name, options, quick=options.quick) for name in options.case or names]
 
 

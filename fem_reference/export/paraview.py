@@ -153,9 +153,7 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference; results that jump between tetrahedra are given at their middles, the least det F at their
-    corners.
-    """
+    """The tetrahedra of a reference; results that jump between them are given at the middles, the least det F at the corners."""
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)

@@ -168,7 +168,7 @@ def field_unit(field: Any) -> str:
 
 
 def kinds(annotation: Any) -> list[Any]:
-    """A type and all types that it is made of."""
+    """A type and all types in it."""
     return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in kinds(part))]
 
 

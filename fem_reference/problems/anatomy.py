@@ -194,7 +194,7 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 
 def _turning(case: MuscleCase) -> Floats:
-    """The matrix (3, 3) from the directions of the lines to those of the material."""
+    """The matrix (3, 3) from the directions of the lines to the directions in the material."""
     if (turned := case.fibres.turned) is None:
         return np.eye(3)
     return RigidMotion(turned.axis, (0.0, 0.0, 0.0), (0.0,), (turned.angle,)).pose(0.0)[:3, :3]
@@ -267,9 +267,7 @@ def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with each point outside the ``surface`` moved to the nearest point of the surface, as there is no solution
-    outside.
-    """
+    """The fibres with points outside the ``surface`` moved to its nearest points, as there is no solution outside."""
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

@@ -244,9 +244,7 @@ def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """Decisions on each effect: an effect on all muscles is needed if any of them needs it, contact if muscles come near each
-    other.
-    """
+    """Decisions on each effect: an effect on all muscles is needed if any muscle needs it, contact if muscles come near."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:

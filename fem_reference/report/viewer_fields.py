@@ -53,7 +53,7 @@ class Fields:
 
     @cached_property
     def lines(self) -> tuple[Polylines, NDArray[np.int64]]:
-        """The fibres that are drawn, and the indices of their points."""
+        """The drawn fibres, and the indices of their points."""
         offsets = self.context.fibres.offsets
         chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
         spans = [(offsets[i], offsets[i + 1]) for i in chosen]
