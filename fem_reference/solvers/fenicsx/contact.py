@@ -181,9 +181,8 @@ class ContactForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, the number of points whose distance
-        was computed; ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total
-        dissipated work.
+        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, the points whose distance was computed;
+        ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
@@ -285,8 +284,7 @@ class ContactForces:
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away no gap is known: the outward direction is then opposite to the travel at the start, and along the travel at the
-        # end.
+        # Far away no gap is known: the outward direction is then against the travel at the start, and along it at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))
